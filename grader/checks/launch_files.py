@@ -45,6 +45,7 @@ from grader.checks.support.shell_scripts import find_obstacle, unclosed_quote, v
 from grader.checks.support.text import near_names, shown
 from grader.checks.support.topics import cite
 from grader.evidence.run import Run
+from grader.installable import known_packages
 from grader.model.launch_file import LAUNCH_TAGS, LaunchFile, LaunchNode
 from grader.model.package import PackageFacts, SourceFile
 from grader.model.record import Record
@@ -173,9 +174,8 @@ def missing_node(package: PackageFacts, file: LaunchFile, script: str) -> Verdic
             f"{file.path} has no <node> for {name}: line {built[0].line} starts {built[0].type}, which is C++"
         )
         return failed(message, hint="; ".join(built_fixes(package, file, name)), citations=(built[0].place,))
-    if slip and any(
-        node.line == slip.line for node in built
-    ):  # what the program is shows once roslaunch starts it
+    # What the program is shows once roslaunch starts it.
+    if slip and f'type="{name}"' not in slip.fix and any(node.line == slip.line for node in built):
         slip = slip._replace(fix="; ".join((slip.fix, *built_fixes(package, file, name))))
     return slip.verdict() if slip else _no_node(package, file, package.name, name)
 
@@ -211,9 +211,10 @@ def _program(package: PackageFacts, file: LaunchFile, program: str) -> Verdict |
 
 def _slip_for(package: PackageFacts, node: LaunchNode, name: str) -> Slip | None:
     slip = node_slip(package, node)
-    if slip is None and node.type == name and node.pkg != package.name:
-        why = f'pkg="{node.pkg}" is not the package of {name}'
-        return Slip(node.file, node.line, why, f'write pkg="{package.name}"')
+    unknown = f"{node.pkg}" not in {*package.others, *known_packages()} and "$(" not in f"{node.pkg}"
+    if slip is None and node.pkg != package.name and (node.type == name or unknown):
+        fix = f'write pkg="{package.name}"' + (f' and type="{name}"' if node.type != name else "")
+        return Slip(node.file, node.line, f'pkg="{node.pkg}" is not the package of {name}', fix)
     written = PurePosixPath(node.type or "")
     if slip is not None and node.pkg == package.name and written.suffix in CPP_SUFFIXES:
         same = written.stem == PurePosixPath(name).stem
@@ -222,8 +223,7 @@ def _slip_for(package: PackageFacts, node: LaunchNode, name: str) -> Slip | None
 
 
 def _is_meant(node: LaunchNode, name: str) -> bool:
-    written = PurePosixPath(node.type or "").name
-    stem = PurePosixPath(name).stem
+    written, stem = PurePosixPath(node.type or "").name, PurePosixPath(name).stem
     # A node under the script's name is meant to run it, whatever its `type`.
     return written in {name, stem} or bool(near_names(name, [written])) or node.name == stem
 

@@ -238,15 +238,20 @@ def _in_another_package(chosen: Candidate, others: list[Candidate], wanted: Want
 
 
 def _outside_of_it(chosen: Candidate, wanted: WantedPackage) -> Iterator[str]:
-    """Yield the lab's files that the package lacks and that lie beside its folder; each begins with its name."""
-    if chosen.path == ".":
-        return
+    """Yield the lab's files that the package lacks and that lie beside its folder, or beside the `src/` of its
+    workspace; each begins with its name."""
     missing = wanted.files - _files_of(chosen.folder, wanted.files)
-    above = PurePosixPath(chosen.path).parent
-    for name, path in sorted(_places_of(chosen.folder.parent, missing, near=True).items()):
-        if "/" in path and path.partition("/")[0] != chosen.folder.name:
-            where, into = (printable(str(PurePosixPath(one, path))) for one in (above, chosen.path))
-            yield f"{printable(name)} is at {where}, outside of the package: move it to {into}"
+    path = PurePosixPath(chosen.path)
+    around = [path.parent] if path.parts else []
+    around += [path.parent.parent] if path.parent.name == "src" else []
+    for above in around:
+        folder = chosen.folder.parents[path.parents.index(above)]
+        taken = path.relative_to(above).parts[0]
+        for name, there in sorted(_places_of(folder, missing, near=True, without=taken).items()):
+            if "/" in there:
+                missing -= {name}
+                where, into = (printable(str(one / there)) for one in (above, path))
+                yield f"{printable(name)} is at {where}, outside of the package: move it to {into}"
 
 
 def _launch_changes(other: Candidate, path: str, chosen: Candidate, wanted: WantedPackage) -> str:
@@ -269,16 +274,18 @@ def _files_of(folder: Path, names: frozenset[str], *, near: bool = False) -> fro
     return frozenset(_places_of(folder, names, near=near))
 
 
-def _places_of(folder: Path, names: frozenset[str], *, near: bool = False) -> dict[str, str]:
-    """Return the paths of those files, the nearest of each name."""
+def _places_of(
+    folder: Path, names: frozenset[str], *, near: bool = False, without: str = ""
+) -> dict[str, str]:
+    """Return the paths of those files, the first of each name; if `near`, only those in usual folders, `without` one of
+    these."""
     found: dict[str, str] = {}
     if names:
         for below in islice(walk(folder, tolerant=True), FOLDERS_OF_A_COPY):
             below.folders[:] = [name for name in below.folders if name not in BUILD_SPACES]
             if near:
-                below.folders[:] = (
-                    sorted(USUAL_FOLDERS.intersection(below.folders)) if below.path == "." else []
-                )
+                usual = USUAL_FOLDERS.intersection(below.folders) - {without}
+                below.folders[:] = sorted(usual) if below.path == "." else []
             for entry in below.others:
                 if entry.name in names:
                     found.setdefault(entry.name, below.inside(entry.name))

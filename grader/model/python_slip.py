@@ -67,7 +67,7 @@ class PythonSlip(Placed, Record):
       the only `publish(…)`, above a loop that waits or in none.
     - `ends-node`: a callback that ends the node, at least sometimes, or what leaves its loop upon an exception; a slip
       only if the node ended by itself.
-    - `sleep-outside`, `sleep-twice`: a loop whose `sleep()` is outside it, or that only makes its Rate, or that
+    - `sleep-outside`, `sleep-twice`: a loop whose `sleep()` is outside it, or whose Rate nothing sleeps by, or that
       waits twice in each turn.
     - `publish-twice`: a loop that publishes on one topic more than once in each turn.
     - `deaf`, `deaf-loop`: why the node goes on after Ctrl-C; a loop that does not ask whether the node should end.

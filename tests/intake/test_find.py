@@ -321,6 +321,16 @@ def test_what_another_package_has_and_the_lab_s_own_has_not_is_named(beside, tol
     assert list(found.hints) == told
 
 
+def test_what_lies_beside_the_src_of_a_workspace_is_named(tmp_path):
+    files = {**tree("src/lab1"), "src/lab1/scripts/talker.py": "", "launch/lab.launch": ""}
+    wanted = WantedPackage(name="lab1", paths=frozenset({"talker.py", "lab.launch"}))
+    found = opened(write(tmp_path / "repo", files), tmp_path, package=wanted)
+    where = (
+        "lab.launch is at launch/lab.launch, outside of the package: move it to src/lab1/launch/lab.launch"
+    )
+    assert list(found.hints) == [where]
+
+
 @pytest.mark.parametrize(
     "text",
     [

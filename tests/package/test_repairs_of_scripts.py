@@ -495,6 +495,7 @@ CASES = {
         "add `find_package(catkin REQUIRED COMPONENTS`",
     ),
     "spin": Case({TALKER: SPINS}, ["missing-call"], after={TALKER: "Int8, print)\n    rospy.spin()\n"}),
+    "spin-of-a-function-that-is-its-own-callback": Case({TALKER: SPINS.replace("Int8, print)", "Int8, listen)")}, []),
     "another-topic": Case(swapped(TALKER, ("'numeric_chatter'", "'numbers'")), []),
     "another-node": Case(swapped(TALKER, ("'talker'", "'my_node'")), []),
     "import-of-everything": Case(swapped(TALKER, ("import Int8", "import *")), []),

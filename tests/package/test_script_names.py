@@ -186,9 +186,10 @@ OBJECTS = {
     "other-method": (f"class A:\n{MADE.replace('__init__', 'setup')}{PAIR}",
                      "give `self.pub` its value in `__init__`, or call `self.setup(…)` there"),
     "nowhere": (f"class A:\n{PAIR}", "in `__init__`, write `self.pub = …`, with the value that it should have"),
-    "nowhere-called": (f"class A:\n{PAIR.replace('pub.publish', 'send')}", "write `def send(self, …):` in the class A"),
+    "nowhere-called": (f"class A:\n{PAIR.replace('pub.publish', 'send')}",
+                       "add a method `def send(self, …):` to the class A"),
     "nowhere-given": (f"class A:\n{PAIR.replace('self.pub.publish(1)', 'Subscriber(1, 2, self.hear)')}",
-                      "write `def hear(self, …):` in the class A"),
+                      "add a method `def hear(self, …):` to the class A"),
     "given-from-outside": ((f"class A:\n{PAIR.replace('self.pub.publish(1)', 'Subscriber(1, 2, callback=self.hear)')}"
                            "def hear(msg):\n    pass\n"), "on line 3, write `hear` instead of `self.hear`"),
     "outside-the-class": ((f"class A:\n{PAIR.replace('self.pub.publish(1)', 'Timer(1, self.hear)')}"

@@ -28,6 +28,15 @@ def ticks(rate):
 for _ in ticks(rospy.Rate(10)):
     pub.publish(1)
 """),
+    "rate-of-another-function": ("sleep-outside", """\
+def made():
+    rate = rospy.Rate(10)
+    return rate
+
+def run(turns):
+    while next(turns):
+        pub.publish(1)
+"""),
     "several-publishers": ("sleep-outside", """\
 while not rospy.is_shutdown():
     for pub in pubs:

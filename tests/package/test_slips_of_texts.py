@@ -292,7 +292,7 @@ def test_objects_that_no_line_makes(text: str, fixes: list[str], tmp_path: Path)
 @pytest.mark.parametrize(
     ("callback", "fix"),
     [
-        ("publish", "write `def publish(self, …):` in the class A"),
+        ("publish", "add a method `def publish(self, …):` to the class A"),
         ("hadle", "on line 3, write `self.handle` instead of `self.hadle`"),
     ],
 )

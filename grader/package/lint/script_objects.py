@@ -246,7 +246,7 @@ def never_defined(own, name, line):
             fix = "indent `def %s` on line %d like the other methods of %s, and its lines below it"
             return why, fix % (name, outside.lineno, own.name)
         return why, "on line %d, write `%s` instead of `self.%s`" % (line, name, name)
-    return why, "write `def %s(self, …):` in the class %s" % (name, own.name)
+    return why, "add a method `def %s(self, …):` to the class %s" % (name, own.name)
 
 
 def classes_as_objects(classes, tree):

@@ -44,6 +44,7 @@ def sleepless_loops(tree):
             continue
         if not outside:
             yield from rates_in_loop(loop)
+            yield from rates_unused(loop, function, tree)
             continue
         name = dotted(outside[0].func) or "sleep"
         message = "`%s()` is outside the loop on line %d" % (name, loop.lineno)
@@ -71,6 +72,22 @@ def rates_in_loop(loop):
         fix = "move line %d above that loop, and write `%s.sleep()` as the last line in the loop"
         fix %= (made[0].lineno, name)
         yield slip(made[0].lineno, "sleep-outside", message, fix, name + ".sleep")
+
+
+def rates_unused(loop, function, tree):
+    """Yield the loop of a script that makes one Rate, above it, and sleeps nowhere."""
+    rates = [n for n in all_of(tree, ast.Assign) if is_call(n.value, "Rate")]
+    named = any(isinstance(n, ast.Attribute) and n.attr == "sleep" for n in ast.walk(tree))
+    skipped = any(isinstance(n, ast.Continue) for n in ast.walk(loop))
+    if len(rates) != 1 or named or skipped or not isinstance(loop, ast.While) or calls_in(tree, *WAITS):
+        return
+    name, line = dotted(rates[0].targets[0]), loop.body[-1].end_lineno
+    known = rates[0] in tree.body or rates[0] in ast.walk(function or tree) or name.startswith("self.")
+    if name and known and rates[0].lineno < loop.lineno:
+        fix = "below line %d, write `%s.sleep()`, with the same spaces or tabs before it as line %d has"
+        fix %= (line, name, loop.body[-1].lineno)
+        message = "nothing sleeps by the Rate of line %d" % rates[0].lineno
+        yield slip(loop.lineno, "sleep-outside", message, fix, name + ".sleep")
 
 
 def sleeps_in_if(loop):

@@ -437,6 +437,8 @@ def _with_spin(text: str) -> Iterator[Step]:
         return
     if (LOOPED | (HOLDING - own)) & {last_name(c.func) for c in calls}:
         return
+    if any(isinstance(f, ast.FunctionDef) and _is_own_callback(f, waits) for f in tree.body):
+        return  # it would wait in its own callback
     lines = text_now.split("\n")
     block = _last_block(tree, waits)
     last = block[-1]
@@ -448,6 +450,12 @@ def _with_spin(text: str) -> Iterator[Step]:
     changed = (n for n, pair in enumerate(zip(text.split("\n"), lines, strict=True), 1) if len({*pair}) > 1)
     imported = f"`spin` behind what line {first} imports, and " if (first := next(changed, 0)) else ""
     yield from step_to("spin", at + 1, text, after, f"{imported}{spin}()")
+
+
+def _is_own_callback(function: ast.FunctionDef, waits: list[ast.Call]) -> bool:
+    """Return whether a function subscribes, and gives itself as the callback."""
+    given = [c for c in waits if function.name in map(last_name, c.args)]
+    return any(c in given for c in nodes_in(function))
 
 
 def _last_block(tree: ast.Module, waits: list[ast.Call]) -> list[ast.stmt]:
