@@ -19,7 +19,15 @@ from grader.rubric.fault_words import model_faults
 from grader.rubric.model import ManualParams
 from grader.rubric.references import reference_faults
 from grader.rubric.scenario import ROSTEST_ENDING
-from grader.rubric.step_faults import call_faults, empty_in, private, served_faults, slash, step_faults
+from grader.rubric.step_faults import (
+    action_names,
+    call_faults,
+    empty_in,
+    private,
+    served_faults,
+    slash,
+    step_faults,
+)
 from grader.rubric.yaml_lines import (
     Fault,
     KeyPath,
@@ -54,6 +62,7 @@ def cross_faults(
     """
     criteria, scenarios = rubric.criteria, rubric.scenarios
     faults = [f for name, s in scenarios.items() for f in scenario_faults(("scenarios", name), s)]
+    faults += action_names(rubric)
     if not isinstance(rubric.data.get("criteria"), list):
         return faults  # that is what is wrong; what else would not fit, follows from it
     for criterion in criteria:

@@ -118,11 +118,14 @@ def _unlike(value: dict[str, Any], given: dict[str, Any], name: str) -> Iterator
         )
         yield ("pose", "pose"), fault
     found = (header.get("frame_id"), value.get("child_frame_id"))
-    if given.get("through") is True or found == (given.get("child"), given.get("parent")):
+    wanted = (given.get("parent"), given.get("child"))
+    if given.get("through") is True or found == wanted[::-1]:
         return
+    if all(found) and set(found).isdisjoint(wanted):
+        return  # a node that names its frames itself, by its namespace for instance
     asks = f"{name} asks for a transform from {given.get('parent')} to {given.get('child')}"
     keys: tuple[KeyPath, ...] = (("header", "frame_id"), ("child_frame_id",))
-    for key, frame, asked in zip(keys, found, (given.get("parent"), given.get("child")), strict=True):
+    for key, frame, asked in zip(keys, found, wanted, strict=True):
         if frame != asked and not str(frame).startswith("/"):
             yield key, f"is {frame}, and {asks}" if frame else f"is missing: {asks}"
 

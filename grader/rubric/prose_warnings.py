@@ -110,6 +110,7 @@ def _shifted_numbers(criterion: WrittenCriterion, rubric: WrittenRubric) -> Iter
     said_hz = _rates(prose)
     there = [number for at, number in numbers_in((), rubric.data) if not _is_setting(at)]
     own = {number for _, number in numbers_in((), criterion.given)}
+    arguments = [one for start in starts_of(criterion.scenario) for _, one in as_texts(start.get("args"))]
     for key in EXPECTED:
         asked = criterion.given.get(key)
         for at, number in numbers_in((key,), asked) if key != "goal" else ():  # which of the goals
@@ -124,6 +125,8 @@ def _shifted_numbers(criterion: WrittenCriterion, rubric: WrittenRubric) -> Iter
             # A list of values may have both signs on purpose.
             is_opposite = key == "values" and meant in own
             if number in said | known or meant is None or is_opposite or is_round or there.count(number) > 1:
+                continue
+            if f"{number:g}" in arguments:
                 continue
             if at[-1] == "tolerance_m" and abs(number) < abs(meant):
                 continue  # a tenth of the way is a usual one
@@ -461,6 +464,8 @@ def _other_text(criterion: WrittenCriterion, rubric: WrittenRubric, keys: tuple[
         if not _letters(text) or text == path[-1] or text in said or re.search(_as_pattern(text), said):
             continue
         alike = [one for one in quoted if _letters(one) == _letters(text) or _is_begun(one, text)]
+        if len({re.sub(r"\d+", "#", one) for one in [*alike, text]}) == 1 < len(alike):
+            continue  # `bowl-1`, `bowl-2` and so on
         alike += [one for one in quoted if sorted(one.lower().split()) == sorted(text.lower().split())]
         others = [one for other in rubric.criteria for _, one in texts_in((), other.given) if one != text]
         others = [one for one in others if not NAME.fullmatch(one)]
@@ -493,7 +498,7 @@ def _differ_in_a_word(said: str, text: str) -> bool:
 def _is_begun(said: str, text: str) -> bool:
     """Return whether a text begins with the words of one that the handout has, but not with its signs."""
     # A single word begins too many texts to say anything.
-    is_longer = len(said.split()) > 1 and _letters(text).startswith(_letters(said))
+    is_longer = len(said.split()) > 1 and bool(_letters(said)) and _letters(text).startswith(_letters(said))
     return is_longer and not re.match(rf"{re.escape(said.strip().lower())}(?!\w)", text.lower())
 
 

@@ -153,17 +153,27 @@ def call_faults(at: KeyPath, given: dict[str, Any], types: dict[str, str]) -> It
     yield from of_type(at, given)
 
 
-def _action_name(at: KeyPath, given: dict[str, Any]) -> Iterator[Fault]:
-    kind = str(given.get("type"))
-    if kind.endswith("Action"):
-        short = kind.removesuffix("Action")
-        yield (*at, "type"), f"is named as its .action file, without Action: {short}"
+def action_names(rubric: WrittenRubric) -> Iterator[Fault]:
+    """Yield types of actions that are those of a message: `TimerAction` for what is in Timer.action."""
+    said = " ".join(text for _, text in rubric.texts)
+    for name, scenario in rubric.scenarios.items():
+        steps = [
+            (("steps", at, "action"), as_map(step.get("action")))
+            for at, step in as_maps(scenario.get("steps"))
+        ]
+        served = [(("serves", at), one) for at, one in as_maps(scenario.get("serves")) if one.get("action")]
+        for at, given in steps + served:
+            kind = str(given.get("type"))
+            short = kind.removesuffix("Action")
+            # A file may end in Action, too: the rubric names it somewhere.
+            if short != kind and not re.search(rf"\b{re.escape(kind.rpartition('/')[2])}\.action\b", said):
+                fault = f"is named as its .action file, without Action: {short}"
+                yield ("scenarios", name, *at, "type"), fault
 
 
 def _action(at: KeyPath, given: dict[str, Any], types: dict[str, str]) -> Iterator[Fault]:
     """Yield the faults of a goal. `types` are those of what earlier steps publish on, and send goals to."""
     name, kind = str(given.get("name")), str(given.get("type"))
-    yield from _action_name(at, given)
     types.setdefault(name, kind)
     for one, other in ((kind, types[name]), (types[name], kind)):
         if one != other and re.sub(r"(Action)?(Goal|Result|Feedback)$", "", one) == other:
@@ -391,8 +401,6 @@ def served_faults(path: KeyPath, scenario: dict[str, Any]) -> Iterator[Fault]:
         answers = [key for key in ANSWERS if served.get(key) or served.get(key) == {}]
         if kind == "service" and len(answers) != 1:
             yield at, give_one(ANSWERS, answers)
-        elif kind == "action":
-            yield from _action_name(at, served)
         yield from of_type(at, served)
 
 

@@ -50,6 +50,28 @@ WHEELS = """\
     steps: [publish: {topic: /turn, type: std_msgs/Float64, value: {made_up: turn}}, wait: {topic: /right}]
 made_up: {turn: {from: 1, to: 3}, right: {product: [turn, 0.5]}}"""
 
+DISHES = """\
+  goals:
+    title: A goal
+    start: [{name: dishes, script: dishes.py}]
+    steps: [action: {name: /dishes, type: lab1/WashAction, goal: {minutes: 3}, limit_s: 5}]"""
+SUM = """\
+  client:
+    title: The client
+    serves: [{service: /add, type: rospy_tutorials/AddTwoInts, answer: {sum: 77}}]
+    start: [{name: client, script: client.py, args: ["-i", "31", "-4"]}]
+    until: {ended: [client]}"""
+FRAMES = """\
+  frames:
+    title: In a namespace
+    start: [{name: frames, script: frames.py, args: ["__ns:=left"]}]
+    steps:
+      - publish:
+          topic: /left/odom
+          type: nav_msgs/Odometry
+          value: {header: {stamp: now, frame_id: odom}, child_frame_id: base_link, pose: {pose: {orientation: {w: 1}}}}
+      - wait: {seconds: 1}"""
+
 
 @pytest.mark.parametrize(
     ("handout", "scenarios", "asked"),
@@ -80,6 +102,16 @@ made_up: {turn: {from: 1, to: 3}, right: {product: [turn, 0.5]}}"""
         ("a quadrotor starts: the node maps publishes geometry_msgs/Twist on /cmd_vel",
          GROWS.replace("/map", "/cmd_vel"),
          ["check: field-equals, with: {topic: /cmd_vel, field: linear.z, value: 0.5}, scenario: grows"]),
+        # an action whose file is called so, and texts that are counted up
+        ("/dishes (action/WashAction.action, goal minutes, result done) washes `bowl-1`, `bowl-2` and so on", DISHES,
+         ["check: action-result, with: {action: /dishes, result: {done: [bowl-1, bowl-2, bowl-3]}}, scenario: goals"]),
+        # a number that a script gets as an argument, and an example without a letter
+        ("client.py asks /add for a sum, as in `-i 3 4`, and prints `-> 7`", SUM,
+         ["check: calls, with: {service: /add, expect: {a: 31, b: -4}}, scenario: client",
+          "check: prints, with: {process: client, text: the sum is}, scenario: client"]),
+        # a node that names its frames by its namespace
+        ("follows /left/odom (from odom to base_link) with the transform from world to left", FRAMES,
+         ["check: transform, with: {parent: world, child: left, pose_of: /left/odom}, scenario: frames"]),
     ],
 )  # fmt: skip
 def test_a_rubric_of_an_unusual_lab_loads_without_a_word(
