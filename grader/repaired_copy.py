@@ -39,7 +39,7 @@ from grader.rubric.model import Rubric
 
 STEERS_WRONG, WARPED = "steers-wrong", "warped"
 REPAIRS_MAX = 4
-"""So many lines of scripts and launch files are repaired, however many mistakes are on one."""
+"""So many lines of each script and launch file are repaired, however many mistakes are on one."""
 
 
 def choose_repairs(
@@ -116,12 +116,14 @@ def _choose_logic(
 
 
 def most_of(helping: Sequence[Repair]) -> list[Repair]:
-    """Return the repairs of so many lines, and all of the manifest and of CMakeLists.txt: they need no run of their
-    own, and without one of them the build shows nothing of the others."""
-    places = dict.fromkeys((one.file, one.line or one.before) for one in helping)
-    of_build = [place for place in places if posixpath.basename(place[0]) in OF_PACKAGES]
-    others = [place for place in places if place not in of_build][:REPAIRS_MAX]
-    return [one for one in helping if (one.file, one.line or one.before) in {*of_build, *others}]
+    """Return the repairs of so many lines of each file, and all of the manifest and of CMakeLists.txt: they need no run
+    of their own, and without one of them the build shows nothing of the others."""
+    places = dict[str, dict[int | str, None]]()
+    for one in helping:
+        places.setdefault(one.file, {})[one.line or one.before] = None
+    of_build = {file for file in places if posixpath.basename(file) in OF_PACKAGES}
+    chosen = {file: lines if file in of_build else [*lines][:REPAIRS_MAX] for file, lines in places.items()}
+    return [one for one in helping if (one.line or one.before) in chosen[one.file]]
 
 
 def _find_in_all(submission: Submission, facts: PackageFacts, rubric: Rubric) -> list[Repair]:

@@ -21,9 +21,11 @@ from grader.model.message_definitions import (
     WRITE_ALL,
     as_written,
     exchanged_parts,
+    full_type,
     lacking_field,
     parse_definition,
     refuse_unknown,
+    under_other_names,
     whole_definition,
 )
 from grader.model.package import Interface, InterfaceField, PackageFacts
@@ -233,21 +235,20 @@ def _renamed(
 ) -> dict[tuple[str, str], InterfaceField]:
     """Return the fields under other names: where a part has as many others as it lacks, of the same types in order; or
     where all of its types are right, in order, and some are under the name of another field."""
+    pairs = under_other_names(wanted, there.values(), package)
+    found = {(a.part, a.name): b for a, b in pairs}
     lacking = [one for one in wanted if one.value is None and (one.part, one.name) not in there]
-    found = {}
     for part in dict.fromkeys(one.part for one in lacking):
-        own = [one for one in lacking if one.part == part]
-        given = [one for one in others.values() if one.part == part and one.value is None]
-        types = [[_plain(one.type, package) for one in group] for group in (own, given)]
-        if types[0] == types[1] and not {one.name for one in given} & {one.name for one in wanted}:
-            found.update({(a.part, a.name): b for a, b in zip(own, given, strict=True)})
+        own, given = (
+            [full_type(f.type, package) for f in group if f.part == part and f.value is None]
+            for group in (lacking, others.values())
+        )
         whole = [
             [f for f in group if f.part == part and f.value is None] for group in (wanted, there.values())
         ]
-        kinds = [[_plain(one.type, package) for one in group] for group in whole]
-        if kinds[0] == kinds[1] and len({*kinds[0]}) > 1 and types[0] != types[1]:
-            pairs = zip(*whole, strict=True)
-            found.update({(a.part, a.name): b for a, b in pairs if a.name != b.name})
+        kinds = [[full_type(one.type, package) for one in group] for group in whole]
+        if kinds[0] == kinds[1] and len({*kinds[0]}) > 1 and own != given:
+            found.update({(a.part, a.name): b for a, b in zip(*whole, strict=True) if a.name != b.name})
     return found
 
 
@@ -305,19 +306,13 @@ def _differs(
         kinds = ("constant", "field") if wanted.value is None else ("field", "constant")
         message = f"{name} is a {kinds[0]} (line {found.line}), but the handout asks for a {kinds[1]}"
         yield _Fault(message, found.line, f"write `{line}`")
-    elif wanted.type and _plain(wanted.type, package) != _plain(found.type, package):
+    elif wanted.type and full_type(wanted.type, package) != full_type(found.type, package):
         message = f"{name} is {found.type} (line {found.line}), but the handout asks for {wanted.type}"
         yield _Fault(message, found.line, f"write `{line}`")
     elif wanted.value is not None and not _equal(wanted.value, found.value or ""):
         message = f"{name} is {shown(found.value or '')} (line {found.line}), not {wanted.value}"
         fix = f"write `{found.type} {line}`" if not wanted.type else f"write `{line}`"
         yield _Fault(message, found.line, fix)
-
-
-def _plain(type_: str, package: str) -> str:
-    base, bracket, size = type_.partition("[")
-    base = FULL_NAMES.get(base, base)
-    return (base if base in BUILT_IN or "/" in base else f"{package}/{base}") + bracket + size
 
 
 def _equal(wanted: str, found: str) -> bool:

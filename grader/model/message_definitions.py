@@ -353,6 +353,31 @@ def _own_fields(type_: str, text: str) -> list[str]:
     return found
 
 
+def full_type(type_: str, package: str) -> str:
+    """Return the type of a field with its package in front, unless it is one of ROS's own."""
+    base, bracket, size = type_.partition("[")
+    base = FULL_NAMES.get(base, base)
+    return (base if base in BUILT_IN or "/" in base else f"{package}/{base}") + bracket + size
+
+
+def under_other_names(
+    wanted: Iterable[InterfaceField], found: Iterable[InterfaceField], package: str
+) -> list[tuple[InterfaceField, InterfaceField]]:
+    """Return pairs of a wanted field and the one that stands for it under another name: where a part has as many others
+    as it lacks, of the same types in order. No constants."""
+    asked, there = ([one for one in fields if one.value is None] for fields in (wanted, found))
+    pairs = list[tuple[InterfaceField, InterfaceField]]()
+    for part in dict.fromkeys(one.part for one in asked):
+        names = [{one.name for one in fields if one.part == part} for fields in (asked, there)]
+        own = [one for one in asked if one.part == part and one.name not in names[1]]
+        given = [one for one in there if one.part == part and one.name not in names[0]]
+        if {one.name for one in given} & {one.name for one in asked}:
+            continue  # of another part
+        if [full_type(one.type, package) for one in own] == [full_type(one.type, package) for one in given]:
+            pairs += zip(own, given, strict=True)
+    return pairs
+
+
 def meant_field(
     field: InterfaceField, own: Collection[str], known: Mapping[str, Collection[str]]
 ) -> tuple[str, str]:

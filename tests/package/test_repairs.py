@@ -328,10 +328,11 @@ def test_an_import_of_what_is_not_there_is_deleted_where_nothing_uses_it(
     assert [one.fix for one in found if one.kind == "missing-import"] == (["delete it"] if deleted else [])
 
 
-def test_a_line_of_the_build_is_repaired_whatever_number_of_scripts_lines_are() -> None:
+def test_a_line_of_the_build_or_of_another_script_is_repaired_whatever_number_of_lines_are() -> None:
     lines = [Repair(kind="missing-call", file="src/a.py", line=n, message="", fix="") for n in range(1, 7)]
+    other = Repair(kind="missing-call", file="src/b.py", line=1, message="", fix="")
     project = Repair(kind="build-line", file="../other/CMakeLists.txt", line=2, message="", fix="")
-    assert most_of([*lines, project]) == [*lines[:REPAIRS_MAX], project]
+    assert most_of([*lines, other, project]) == [*lines[:REPAIRS_MAX], other, project]
 
 
 @pytest.mark.parametrize(

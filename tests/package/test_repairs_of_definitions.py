@@ -50,6 +50,15 @@ def own_from(module: str) -> dict[str, str]:
 
 
 GO_FIELDS = tuple(parse_definition("int32 n\n---\nbool there\n---\nint32 left\n", ".action"))
+SUM_FIELDS = tuple(parse_definition("int64 a\nint64 b\n---\nint64 sum", ".srv"))
+SERVE_SUM = """\
+import rospy
+from lab.srv import Two, TwoResponse
+
+rospy.init_node('serve')
+rospy.Service('add', Two, lambda one: TwoResponse(one.x + one.y))
+rospy.spin()
+"""
 TWO_FIELDS = tuple(parse_definition("int64 a\n---\nint64 sum", ".srv"))
 LEVEL_FIELDS = tuple(
     parse_definition("float64 level\nstring[] names\nint8 b", ".msg")
@@ -240,8 +249,27 @@ CASES = {
         {"msg/Level.msg": "float64 level\nstring[] names\nint8 b\nint32 OFF=0\n"},
     ),
     "own-message-with-another-field": Case(
-        {**OWN, "msg/Level.msg": "float64 depth\nstring[] names\nint8 b\n", CMAKELISTS: GENERATED}, [],
-        wanted=asking(definitions=(("msg/Level.msg", LEVEL_FIELDS),)),
+        {**OWN, "msg/Level.msg": "float64 depth\nstring[] names\nint8 b\n", CMAKELISTS: GENERATED}, ["build-line"],
+        "line 1 of msg/Level.msg calls it depth, but the handout calls it level",
+        asking(definitions=(("msg/Level.msg", LEVEL_FIELDS),)),
+        {"msg/Level.msg": "float64 level\nstring[] names\nint8 b\n"},
+    ),
+    "own-service-with-other-fields": Case(
+        {"src/serve.py": SERVE_SUM, "srv/Two.srv": "int64 x\nint64 y\n---\nint64 sum\n", CMAKELISTS: SERVICE_CMAKE},
+        ["build-line"] * 2 + ["missing-call"], "src/serve.py uses the fields x and y, which the handout calls a and b",
+        asking(definitions=(("srv/Two.srv", SUM_FIELDS),)),
+        {"src/serve.py": SERVE_SUM.replace(".x + one.y", ".a + one.b"),
+         "srv/Two.srv": "int64 a\nint64 b\n---\nint64 sum\n"},
+    ),
+    "own-service-with-other-fields-that-a-pose-has": Case(
+        {"src/serve.py": f"from geometry_msgs.msg import Pose2D\n{SERVE_SUM}", CMAKELISTS: SERVICE_CMAKE,
+         "srv/Two.srv": "int64 x\nint64 y\n---\nint64 sum\n"},
+        [], wanted=asking(definitions=(("srv/Two.srv", SUM_FIELDS),)),
+    ),
+    "own-service-with-other-fields-the-other-way-round": Case(
+        {"src/serve.py": SERVE_SUM.replace("one.x + one.y", "one.bow + one.aft"), CMAKELISTS: SERVICE_CMAKE,
+         "srv/Two.srv": "int64 bow\nint64 aft\n---\nint64 sum\n"},
+        [], wanted=asking(definitions=(("srv/Two.srv", SUM_FIELDS),)),
     ),
     "own-action-without-its-feedback": Case(
         {"src/go.py": "from lab.msg import GoAction\n", "action/Go.action": "int32 n\n---\nbool there\n",

@@ -157,7 +157,8 @@ def no_answer(package: PackageFacts, run: Run, service: str, one: Exchange) -> V
         if (found_order := _IN_ORDER.search(one.detail)) and len({*map(_sorted, found_order.groups())}) == 1:
             order = shown(found_order[2])
             hint = f"write the fields in srv/{kind}.srv in the handout's order, {order}, and build again"
-        return _undivided(package, kind, one) or failed(message, hint=hint)
+        verdict = _undivided(package, kind, one) or failed(message, hint=hint)
+        return verdict.based_on(judged_by="definition", unjudged=True)
     if "returned None" in one.detail:
         hint = f"end the callback with return {kind}Response(…)"
         verdict = failed(f"{asked} fails: its callback returns nothing", hint=hint)

@@ -37,9 +37,9 @@ from grader.package.repairs.cmake_calls import (
     values_behind,
     words_of,
 )
+from grader.package.repairs.definitions import define_as_asked
 from grader.package.repairs.editing import Files, keep_first_version, naming_files, rename_word
 from grader.package.repairs.interfaces import (
-    define_as_asked,
     depend_on_exported,
     make_interfaces,
     name_roscpp,
