@@ -383,6 +383,7 @@ def name_other_parameters(verdict: Verdict, criterion: Criterion, facts: Facts) 
     lines = [line.partition("#")[0][:LINE_CHARS] for line in build.file_lines(found["file"])[:LINES_READ]]
     number = int(found["line"])
     given = [str(param.name) for param in scenario.params]
+    given += re.findall(r"(?<!\S)_(\w+):=", " ".join(arg for start in scenario.start for arg in start.args))
     given += (one["name"] for line in lines[number - 1 : number] for one in _READS_PARAMETER.finditer(line))
     given += re.findall(r"""\b(?:set|has)_param\(\s*['"]([^'"]+)""", "\n".join(lines))
     known = {name.rpartition("/")[2].lstrip("~") for name in (*given, *OF_ROS)}

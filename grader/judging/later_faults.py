@@ -248,7 +248,12 @@ class Later:
     def _built(self) -> Iterator[Fix]:
         """Sources of C++, and messages, that are not there: CMake asks for them only once it has found all packages."""
         calls = cmake_calls(self._package, "add_executable", "add_library", *INTERFACES)
-        words = (INTERFACES.get(c.name, "") + w for c in calls if "DIRECTORY" not in c.args for w in c.args)
+        words = (
+            INTERFACES.get(c.name, "") + word
+            for c in calls
+            if "DIRECTORY" not in c.args
+            for word in c.args[c.name not in INTERFACES :]  # a target may be called talker.cpp
+        )
         kinds = (*CPP_SUFFIXES, ".msg", ".srv", ".action")
         named = dict.fromkeys(word for word in words if PurePosixPath(word).suffix in kinds)
         beside = f"{self._package.folder_beside}/"  # what lies there is right once the build files do

@@ -496,10 +496,15 @@ def test_parameters_that_are_not_set_either_are_named(
     assert name_other_parameters(hidden, lab.criteria[0], facts) == hidden
 
 
-def test_parameters_are_not_known_where_a_launch_file_may_set_them() -> None:
-    start = [{"name": "talker", "launch": "lab1.launch"}]
+@pytest.mark.parametrize(
+    "given", [{"launch": "lab1.launch"}, {"script": SCRIPT["path"], "args": ["a", "_number:=3"]}]
+)
+def test_parameters_are_not_named_that_a_launch_file_may_set_or_an_argument_sets(
+    given: dict[str, Any],
+) -> None:
+    start = [{"name": "talker", **given}]
     lab = rubric(RATE, scenarios={"talker": {**SCENARIO, "start": start}})
-    source = "#!\nrate = rospy.get_param('/hz')\nn = rospy.get_param('/number')\n"
+    source = "#!\nrate = rospy.get_param('/hz')\nn = rospy.get_param('~number')\n"
     package = {"package": {"files": [SCRIPT]}, "attachments": {SCRIPT["path"]: source}}
     runs = build_runs({"runs": {"package": package}})
     message = f"ended before (KeyError: '/hz' ({SCRIPT['path']}, line 2): the parameter '/hz' is not set)"

@@ -73,18 +73,23 @@ def test_a_namespace_in_which_the_topic_belongs_is_not_told_as_wrong(topic: str,
 
 
 def test_messages_that_are_not_there_are_named_where_catkin_sees_no_package() -> None:
-    cmake = {"calls": [["add_message_files", "FILES", "Note.msg"], ["catkin_package"]]}
+    target = ["add_executable", "talker.cpp", "src/talker.cpp"]  # the program is called so
+    cmake = {"calls": [["add_message_files", "FILES", "Note.msg"], ["catkin_package"], target]}
     built = {"processes": [{"name": "catkin_make", "role": "build", "exit_code": 0, "exit_s": 2}]}
     named = {"id": "manifest", "check": "manifest", "with": {"name": "lab1"}}
     asked = rubric(named, {"id": "build", "check": "build", "requires": ["manifest"]})
     beside = [{"path": "lab1/msg/Note.msg"}, {"path": "lab1/scripts/a.py"}]
     for files, told in (([], True), ([{"path": "msg/Note.msg"}], False), (beside, False)):
+        files.append({"path": "src/talker.cpp"})
         runs = build_runs({"runs": {"package": built}, "package": {"cmake": cmake, "files": files}})
         hint = judge(asked, runs)[0].hint
         assert ("; then add msg/Note.msg, which is not there, and push it" in hint) == told
-        assert "instead of msg/Note.msg" not in hint
+        assert "instead of" not in hint
     runs = build_runs(
-        {"runs": {"package": built}, "package": {"cmake": cmake, "files": [{"path": "Note.msg"}]}}
+        {
+            "runs": {"package": built},
+            "package": {"cmake": cmake, "files": [{"path": "Note.msg"}, {"path": "src/talker.cpp"}]},
+        }
     )
     assert judge(asked, runs)[0].hint.endswith("; then move Note.msg to msg/Note.msg")
 

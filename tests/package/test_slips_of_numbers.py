@@ -429,6 +429,8 @@ EACH = "def f(scan):\n    for i in range(90):\n        if scan.ranges[i] < 1:\n 
         (KEPT.replace("    if", "    cmd = Twist()\n    if") + SENT, []),
         (KEPT + "    cmd.angular.z = cmd.linear.x = 0\n" + SENT, []),
         (KEPT, []),
+        # what is set now and then lasts until the next time
+        (KEPT.replace("if s:", "if now() - last > 2:\n        last = now()") + SENT, []),
         (KEPT.replace("def f(scan)", "while ok()") + SENT,
          ["above line 4, write `cmd.angular.z = 0`", "above line 4, write `cmd.linear.x = 0`"]),
         (EACH + "        else:\n            v.x = 1\n        pub.publish(v)\n",

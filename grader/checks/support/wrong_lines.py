@@ -59,6 +59,7 @@ SEEN_BY = {
     "argv": OF_ARGUMENTS,
     "swallowed": (*OF_ARGUMENTS, "service-answers", "action-result"),
     "shared": ("field-equals", "rostest"),
+    "kept": (*OF_STEERING, "field-equals", "field-bounds", "rostest"),
 }
 """The checks that see what some slips make wrong."""
 

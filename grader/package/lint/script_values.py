@@ -388,7 +388,9 @@ def kept_velocities(tree):
             for n, of in made.items()
             if inside.isdisjoint(of) and here.issuperset(of.values()) and n not in given
         ]
-        choices = [n for n in block.body if isinstance(n, ast.If)] if kept else []
+        choices = (
+            [n for n in block.body if isinstance(n, ast.If) and not sets_what_it_asks(n)] if kept else []
+        )
         for choice in choices[:USES_LIMIT]:
             below = [n for one in block.body if one.lineno > choice.lineno for n in calls_in(one, "publish")]
             sent = {dotted(n.args[0]) for n in below if n.args}
@@ -402,6 +404,13 @@ def kept_velocities(tree):
                     message = "`%s` keeps its last %s.%s where the `if` on line %d does not set it"
                     fix = "above line %d, write `%s = 0`" % (line, field)
                     yield slip(line, "wrong-value", message % (name, part, axis, line), fix, "kept")
+
+
+def sets_what_it_asks(choice):
+    """Tell whether an `if` gives a new value to what it asks for, as one does that is true now and then: what it sets
+    lasts until the next time."""
+    asked = {dotted(n) for n in ast.walk(choice.test) if isinstance(n, (ast.Name, ast.Attribute))}
+    return not asked.isdisjoint([*set_in(choice), *(dotted(n) for n in stored_in([choice]))])
 
 
 def branches_of(choice):
