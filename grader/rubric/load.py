@@ -338,14 +338,30 @@ def _needs(loaded: LoadedRubric, is_meant: Callable[[Check], bool]) -> bool:
 
 
 def rates_of(rubric: Rubric) -> dict[str, tuple[RateBounds, ...]]:
-    """Return, by scenario, the rates that end a run once they are clear."""
+    """Return, by scenario, the rates that end a run once they are clear: none where another criterion may wait for what
+    comes later."""
     found: dict[str, list[RateBounds]] = defaultdict(list)
+    lasting = {c.scenario for c in rubric.criteria if c.scenario and _may_come_late(c, rubric)}
     for criterion in rubric.criteria:
         check = CHECKS.get(criterion.check)
         bounds = check.rate_bounds(criterion.parameters) if check and criterion.scenario else None
-        if bounds is not None:
+        if bounds is not None and criterion.scenario not in lasting:
             found[criterion.scenario or ""].append(bounds)
     return {scenario: tuple(rates) for scenario, rates in found.items()}
+
+
+def _may_come_late(criterion: Criterion, rubric: Rubric) -> bool:
+    """Return whether what a criterion judges may come only after the rates of its run are clear."""
+    given, topics = criterion.parameters, rubric.scenarios[criterion.scenario or ""].until.topics
+    if given.get("values") or given.get("when") in {"any", "last"}:
+        return True
+    return criterion.check not in SEEN_AT_ONCE or given.get("topic", next(iter(topics), "")) not in topics
+
+
+SEEN_AT_ONCE = {
+    "rate", "node-lives", "node-name", "topic-type", "stamps", "message", "field-equals", "field-bounds",
+}  # fmt: skip
+"""Checks of what the first messages on a run's topics show as the later ones do."""
 
 
 def watched_of(rubric: Rubric) -> dict[str, float]:

@@ -417,10 +417,10 @@ class Until(Record):
     """
 
     window_s: Seconds | None = None
-    """This long after the first message on every topic of `topics`, or until the rates that are judged
-    there are clear. The run waits for a silent topic until `silent_s` after the first message on another,
-    and twice as long while messages come to a node of the student's, which may collect many before it
-    publishes."""
+    """This long after the first message on every topic of `topics`, or, where no criterion judges what may
+    come later (another topic, a last value, a line that is printed), until the rates are clear. The run
+    waits for a silent topic until `silent_s` after the first message on another, and twice as long while
+    messages come to a node of the student's, which may collect many before it publishes."""
     topics: tuple[str, ...] = ()
     """The topics of `window_s`, with their slash."""
     messages: Annotated[dict[str, int], Field(default_factory=dict)]

@@ -9,7 +9,7 @@ import pytest
 
 from grader.errors import RubricError
 from grader.rubric.find import rubrics_folder
-from grader.rubric.load import goals_of, load_rubric
+from grader.rubric.load import goals_of, load_rubric, rates_of
 from tests.rubric.samples import faults, spoiled
 
 
@@ -137,6 +137,28 @@ def test_how_long_the_result_of_a_goal_matters_and_how_much_feedback_it_takes(
     path.write_text(text.replace(old, new).replace("limit_s: 5}", "limit_s: 20}"), encoding="utf-8")
     found = goals_of(load_rubric(str(path)).rubric)["goals"]
     assert found == {("/count", number): judged for number, judged in goals.items()}
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "ends"),
+    [
+        ("", "", True),
+        ("data, value: {made_up: color}}", "data, value: {made_up: color}, when: first}", True),
+        ("data, value: {made_up: color}}", "data, value: {made_up: color}, when: last}", False),
+        ("data, value: {made_up: color}}", "data, values: [{made_up: color}, red]}", False),
+        ("topic: /state, field", "topic: /lamp/state, field", False),
+        ("check: field-equals,\n     with: {topic: /state, field: data, value: {made_up: color}}",
+         "check: prints,\n     with: {process: lamp, text: lit}", False),
+    ],
+)  # fmt: skip
+def test_clear_rates_end_a_run_in_which_nothing_is_judged_that_may_come_later(
+    old: str, new: str, ends: bool, tmp_path: Path
+) -> None:
+    text = (rubrics_folder() / "examples" / "params-and-namespaces.yaml").read_text(encoding="utf-8")
+    assert old in text
+    path = tmp_path / "lab.yaml"
+    path.write_text(text.replace(old, new, 1), encoding="utf-8")
+    assert ("colored" in rates_of(load_rubric(str(path)).rubric)) == ends
 
 
 CALL = "{service: /reset, type: std_srvs/Empty}"
