@@ -32,7 +32,7 @@ from grader.evidence.events import CATKIN_MAKE, STOPPED
 from grader.evidence.run import Run
 from grader.installable import noetic_messages
 from grader.model.generated_headers import fixes_of, reasons_of, unwaited_targets
-from grader.model.package import CMAKE, Executable, PackageFacts
+from grader.model.package import CMAKE, Executable, PackageFacts, meant_manifest
 from grader.model.record import Record
 from grader.model.verdict import (
     FileCitation,
@@ -121,7 +121,8 @@ def _unseen(package: PackageFacts) -> Verdict | None:
     """Return the loss of a package that catkin does not find, or is told to pass over: it builds nothing of it."""
     if package.has_no_manifest:
         why = "catkin_make builds nothing of the package: catkin does not see one without package.xml"
-        return failed_or_blocked(why, measured=NOT_BUILT, hint="write package.xml, then run catkin_make")
+        meant = next(filter(None, (meant_manifest(file.path) for file in package.files)), "")
+        return failed_or_blocked(why, measured=NOT_BUILT, hint=meant or "write package.xml, then run catkin_make")
     if package.file(IGNORE) is None:
         return None
     message = f"catkin_make builds nothing of the package: {IGNORE} hides it from catkin"
