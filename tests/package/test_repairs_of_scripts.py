@@ -38,6 +38,12 @@ LAUNCH_THREE = "".join(
 HEARD = "def heard(m):\n    x = m.data\n    y = -x\n    n += 1\n"
 OWN_POINT = {"msg/Point.msg": "int8 X\n"}
 
+
+def with_line(line: str) -> dict[str, str]:
+    """Return the talker with this line above the one that makes its node."""
+    return swapped(TALKER, ("    rospy.init", f"    d = {{'a': 1}}\n    {line}\n    rospy.init"))
+
+
 CASES = {
     "crlf": Case({TALKER: SCRIPT.replace("\n", "\r\n")}, ["line-ends"], "has Windows line endings"),
     "bom": Case({TALKER: b"\xef\xbb\xbf" + SCRIPT.encode()}, ["byte-order-mark"], "byte order mark"),
@@ -237,6 +243,14 @@ CASES = {
     ),
     "future-at-the-top": Case(
         swapped(TALKER, ("import rospy\n", "from __future__ import print_function\nimport rospy\n")), [],
+    ),
+    "methods-of-python-2": Case(
+        with_line("print(not d.has_key('a'), d.has_key('a') == 1, list(d.iteritems()))"), ["python-syntax"],
+        "has_key, iteritems is Python 2",
+        after=with_line("print(not 'a' in d, ('a' in d) == 1, list(d.items()))"),
+    ),
+    "methods-of-an-own-class": Case(
+        with_line("class Keys:\n        def has_key(self, key):\n            return key\n    Keys().has_key(1)"), [],
     ),
     "raw-input": Case(swapped(TALKER, ("    rospy.init", "    raw_input()\n    rospy.init")), ["python-syntax"],
         "raw_"),

@@ -39,6 +39,7 @@ from grader.package.python_repairs.names import (
     ROSPY,
     bound_in,
     meant_by,
+    old_methods,
     with_methods,
     with_names,
     with_parameters,
@@ -187,11 +188,12 @@ def _without_old_names(text: str) -> Iterator[Step]:
     tried = {id(n) for one in nodes_in(tree) if isinstance(one, ast.Try) for n in _caught_in(one)}
     uses = [n for n in nodes_in(tree) if isinstance(n, ast.Name) and n.id in OLD_NAMES and n.id not in bound]
     uses = [n for n in uses if id(n) not in tried]
-    spans = [(span, OLD_NAMES[n.id]) for n in uses if (span := span_of(lines, n))]
-    if spans:
-        names = ", ".join(sorted({n.id for n in uses}))
-        after = edited(text, [(*span, new) for span, new in spans])
-        yield from step_to("old-name", min(n.lineno for n in uses), text, after, names)
+    found = [(n.id, span, OLD_NAMES[n.id]) for n in uses if (span := span_of(lines, n))]
+    found += old_methods(tree, text)
+    if found:
+        names = ", ".join(sorted({name for name, _, _ in found}))
+        after = edited(text, [(*span, new) for _, span, new in found])
+        yield from step_to("old-name", min(span[0] for _, span, _ in found) + 1, text, after, names)
 
 
 def _asks_for_version(node: ast.AST) -> bool:

@@ -535,3 +535,26 @@ def _bound_by(statement: ast.stmt) -> frozenset[str]:
 def _catches_names(block: ast.Try) -> bool:
     kinds = [ast.unparse(handler.type) if handler.type else "" for handler in block.handlers]
     return any("NameError" in kind for kind in kinds)
+
+
+OLD_METHODS = {"iteritems": "items", "itervalues": "values", "iterkeys": "keys"}
+"""Methods of a dict that have another name now; pandas has the first one of its own."""
+
+
+def old_methods(tree: ast.AST, text: str) -> Iterator[tuple[str, tuple[int, int, int], str]]:
+    """Yield the name, the place and the new text of calls of methods that dicts no longer have."""
+    lines, nodes = text.split("\n"), list(nodes_in(tree))
+    own = {n.name for n in nodes if isinstance(n, ast.FunctionDef)}
+    operands = (ast.Compare, ast.BinOp, ast.Attribute)
+    inner = {id(c) for n in nodes if isinstance(n, operands) for c in ast.iter_child_nodes(n)}
+    for n in nodes:
+        if not (isinstance(n, ast.Call) and isinstance(n.func, ast.Attribute)) or n.func.attr in own:
+            continue
+        name, span, of_name = n.func.attr, span_of(lines, n), span_of(lines, n.func)
+        if name == "has_key" and len(n.args) == 1 and span:
+            key, owner = (ast.get_source_segment(text, one) for one in (n.args[0], n.func.value))
+            new = f"{key} in {owner}"
+            yield name, span, f"({new})" if id(n) in inner else new
+        elif name in OLD_METHODS and not n.args and of_name and "pandas" not in text:
+            line, _, end = of_name
+            yield name, (line, end - len(name), end), OLD_METHODS[name]
