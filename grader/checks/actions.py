@@ -194,9 +194,8 @@ def _without_result(
     if slip is None or goal.end is None or not _is_empty(goal.end.value):
         return verdict
     why = f"line {slip.line} of {slip.file} gives it no result"
-    return verdict.explained(
-        why, f"on line {slip.line}, write `{slip.message}(…)` with the result", (slip.place,)
-    )
+    fix = slip.fix or f"write `{slip.message}(…)` with the result"
+    return verdict.explained(why, f"on line {slip.line}, {fix}", (slip.place,))
 
 
 def _unlike_last_report(

@@ -122,7 +122,9 @@ def _unseen(package: PackageFacts) -> Verdict | None:
     if package.has_no_manifest:
         why = "catkin_make builds nothing of the package: catkin does not see one without package.xml"
         meant = next(filter(None, (meant_manifest(file.path) for file in package.files)), "")
-        return failed_or_blocked(why, measured=NOT_BUILT, hint=meant or "write package.xml, then run catkin_make")
+        return failed_or_blocked(
+            why, measured=NOT_BUILT, hint=meant or "write package.xml, then run catkin_make"
+        )
     if package.file(IGNORE) is None:
         return None
     message = f"catkin_make builds nothing of the package: {IGNORE} hides it from catkin"

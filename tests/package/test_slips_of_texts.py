@@ -355,6 +355,9 @@ def test_a_sum_of_numbers_is_no_text(tmp_path: Path) -> None:
         ("try:\n    a()\nexcept X:\n    pass\nexcept Exception:\n    pass\n", "catches", []),
         ("try:\n    a()\nexcept:\n    pass\n", "catches", []),
         ("s.set_preempted()\ns.set_succeeded(r)\n", "no-result", [(1, "s.set_preempted", "", "set_preempted")]),
+        ("def f(g):\n    done = GoResult(1)\n    s.set_succeeded(g.n)\n", "no-result",
+         [(3, "s.set_succeeded", "write `s.set_succeeded(done)`", "set_succeeded")]),
+        ("def f(g):\n    done = GoResult(1)\n    s.set_succeeded(done)\n", "no-result", []),
     ],
 )  # fmt: skip
 def test_what_becomes_of_results(

@@ -113,7 +113,8 @@ def explain_by_wrong_value(check: Check, package: PackageFacts, run: Run, verdic
     kinds = ["wrong-value", "compared"] if of_values and not verdict.basis.cause else []
     if check.name in (*OF_CONNECTIONS, *OF_ARGUMENTS) and not verdict.basis.cause and not kinds:
         kinds = ["wrong-value"]
-    if check.name == "action-result" and verdict.basis.wrong != "nothing" and ends_twice(run):
+    unexplained = verdict.basis.wrong != "nothing" and not verdict.basis.cause
+    if check.name == "action-result" and unexplained and ends_twice(run):
         kinds.append("goes-on")
     found = [s for s in package.slips if s.kind in kinds and s.file in files]
     found = [s for s in found if _may_show(s, check, run, verdict, of_values=of_values)]
@@ -137,7 +138,9 @@ def explain_by_wrong_value(check: Check, package: PackageFacts, run: Run, verdic
     for slip in sure[:1] or maybe[:4]:
         why = f"line {slip.line} of {slip.file}: {slip.message}"
         fix = f"on line {slip.line}, {slip.fix}" if slip.kind == "compared" else slip.fix
-        hint, cause = fix if sure else f"{verdict.hint}; {fix}", slip.message if sure else ""
+        # a line that is told already is wrong as well
+        hint = fix if sure and not verdict.hint.startswith("on line ") else f"{verdict.hint}; {fix}"
+        cause = slip.message if sure else ""
         verdict = verdict.explained(why, hint, (slip.place,), cause=cause)
     return verdict
 

@@ -114,10 +114,22 @@ def asked_in(loop, without):
 
 
 def ended_without_result(tree):
-    """Calls that end a goal and give it no result."""
+    """Calls that end a goal and give it no result, or something else than the result that the function makes."""
+    results = {}
+    for own in all_of(tree, ast.FunctionDef):
+        made = {
+            dotted(n.targets[0]) for n in all_of(own, ast.Assign) if called_name(n.value).endswith("Result")
+        }
+        read = {dotted(n) for n in all_of(own, ast.Name, ast.Attribute) if isinstance(n.ctx, ast.Load)}
+        if len(made) == 1 and made.isdisjoint(read):
+            results.update((call, *made) for call in calls_in(own, "set_succeeded", "set_aborted"))
     for call in calls_in(tree, "set_succeeded", "set_aborted", "set_preempted"):
+        name = dotted(call.func)
         if not call.args and not call.keywords:
-            yield slip(call.lineno, "no-result", dotted(call.func), name=call.func.attr)
+            yield slip(call.lineno, "no-result", name, name=call.func.attr)
+        elif call in results and call.args:
+            fix = "write `%s(%s)`" % (name, results[call])
+            yield slip(call.lineno, "no-result", name, fix, call.func.attr)
 
 
 CANCELS = 3
