@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from grader.checks.registry import NoParams, check
 from grader.checks.support.build_errors import MAY_FAIL, UNKNOWN_COMMAND, explain_error_of_build
-from grader.checks.support.cpp_errors import FIRST_ERROR_HINT, first_error
+from grader.checks.support.cpp_errors import FIRST_ERROR_HINT, BuildError, first_error, further_errors
 from grader.checks.support.exit_causes import RUN_IT, explain_end
 from grader.checks.support.launch import IGNORE
 from grader.checks.support.processes import NO_SCRIPT_HINT, Life, lives
@@ -281,7 +281,7 @@ def _broken_build(package: PackageFacts, build: Run, exit_code: int | None) -> V
         f"catkin_make failed: {line}{told.why}" if told else "catkin_make failed without naming an error",
         expected=EXPECTED,
         measured=f"exit code {exit_code}",
-        hint=told.hint if told else FIRST_ERROR_HINT,
+        hint=told.hint + _further_hints(lines, package, error) if told and error else FIRST_ERROR_HINT,
         citations=(place or cite(build, "/grader/console"),),
     )
     if told:
@@ -293,6 +293,24 @@ def _broken_build(package: PackageFacts, build: Run, exit_code: int | None) -> V
     if UNKNOWN_COMMAND in error.text and not told.by_itself:
         return verdict
     return verdict.based_on(cause=f"{line}{told.why}")
+
+
+def _further_hints(lines: Sequence[str], package: PackageFacts, first: BuildError) -> str:
+    """Return what to write on other lines of the same source, behind a wrong name, where it is sure: what follows from
+    a bracket that is missing, for one, says nothing."""
+    if not _OF_NAMES.search(first.text):
+        return ""
+    found = (
+        (one, explain_error_of_build(one, package, lines).hint)
+        for one in further_errors(lines, package, first)
+    )
+    sure = [f"; on line {one.place.line}, {hint}" for one, hint in found if one.place and _SURE.match(hint)]
+    return "".join(sure[:FURTHER_MAX])
+
+
+_OF_NAMES = re.compile(r"not (?:been )?declared|not name a |has no member|not a member")
+_SURE = re.compile(r"write (?:\w+::\w+$|\S+ in place of |the \w+'s variable )")
+FURTHER_MAX = 4
 
 
 def _lost_scripts(package: PackageFacts, scripts: Sequence[str]) -> Verdict | None:

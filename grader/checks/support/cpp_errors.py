@@ -93,18 +93,34 @@ def first_error(lines: Sequence[str], package: PackageFacts) -> BuildError | Non
             text = f"{match['file']}:{match['line']}: {text}" if named else text
             return BuildError("cmake", shown(text, ERROR_CHARS), place)
         if match := _COMPILER_ERROR.match(line):
-            place = _own_line(package, match["file"], int(match["line"]))
-            of_system = match["file"].startswith(SYSTEM)
-            # in a header of ROS, where the student's own line is the last one that led there
-            place = required if of_system else place
-            file, number = (place.file, place.line) if of_system and place else (match["file"], match["line"])
-            where = f"{posixpath.basename(file)}:{number}: "
-            name = "" if of_system and not place else where
-            # the other name of a type is long, and would leave no room for what is wrong with it
-            text = name + re.sub(r" \{aka [^}]*\}", "", match["text"])
-            return BuildError("compiler", shown(text, ERROR_CHARS), place)
+            return _of_compiler(match, package, required)
     other = next((m["text"] for m in map(_OTHER_ERROR.match, lines) if m), None)
     return BuildError("other", shown(other, ERROR_CHARS), None) if other else None
+
+
+def _of_compiler(match: re.Match[str], package: PackageFacts, required: FileCitation | None) -> BuildError:
+    place = _own_line(package, match["file"], int(match["line"]))
+    of_system = match["file"].startswith(SYSTEM)
+    # in a header of ROS, where the student's own line is the last one that led there
+    place = required if of_system else place
+    file, number = (place.file, place.line) if of_system and place else (match["file"], match["line"])
+    where = f"{posixpath.basename(file)}:{number}: "
+    name = "" if of_system and not place else where
+    # the other name of a type is long, and would leave no room for what is wrong with it
+    text = name + re.sub(r" \{aka [^}]*\}", "", match["text"])
+    return BuildError("compiler", shown(text, ERROR_CHARS), place)
+
+
+def further_errors(lines: Sequence[str], package: PackageFacts, first: BuildError) -> list[BuildError]:
+    """Return what the compiler says of other lines of the same source as the first error's, one error of each."""
+    matches = filter(None, map(_COMPILER_ERROR.match, lines if first.kind == "compiler" else ()))
+    found = (_of_compiler(match, package, None) for match in matches)
+    by_line = {
+        one.place.line: one
+        for one in found
+        if one.place and first.place and one.place.file == first.place.file
+    }
+    return [one for line, one in by_line.items() if first.place and line != first.place.line]
 
 
 def _callers(lines: Sequence[str]) -> list[tuple[str, int]]:

@@ -14,6 +14,7 @@ from grader.checks.support.cpp_errors import (
     no_type,
     plainly,
 )
+from grader.checks.support.text import near_names
 from grader.installable import noetic_messages
 from grader.model.package import PackageFacts
 from grader.wording import join_words
@@ -156,6 +157,35 @@ def _not_in_namespace(found: re.Match[str], package: PackageFacts, lines: Sequen
     return Explained(found.string, f"write {near} in place of {found['name']}" if near else FIRST_ERROR_HINT)
 
 
+def _no_field(found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:
+    """A field that the package's own message, or that part of its service, does not have."""
+    kind, part, name = found["kind"], (found["part"] or "").lower(), found["field"]
+    own = next(
+        (one for one in package.interfaces if posixpath.basename(one.path).partition(".")[0] == kind), None
+    )
+    meant = re.search(r"; did you mean '([^']+)'", found.string)
+    if meant or own is None or found["package"] != package.name:
+        return Explained(found.string, f"write {meant[1]} in place of {name}" if meant else FIRST_ERROR_HINT)
+    fields = [one.name for one in own.fields if one.part == part and one.value is None]
+    other = next((one.part for one in own.fields if one.name == name and one.part != part), "")
+    of = f"the {part} of {kind}" if part else kind
+    why = f"{of} has no field {name}"
+    if other:
+        return Explained(
+            f"{why}: it is one of the {other}", f"write the {other}'s variable in front of {name}"
+        )
+    near = near_names(name, fields)
+    hint = (
+        f"write {near[0]} in place of {name}"
+        if near
+        else f"write the one that you mean of {join_words(fields)}"
+    )
+    return Explained(f"{why}; it has {join_words(fields)}" if fields else why, hint)
+
+
+_OWNER = (
+    r"(?:const )?(?:struct )?(?P<package>\w+)::(?P<kind>\w+?)(?:::)?(?P<part>Request|Response)?(?:_<[^']*)?"
+)
 TYPE_ERRORS: tuple[tuple[str, Explain], ...] = (
     (
         r"cast from 'const char ?\*' to '(\w+)' loses precision",
@@ -192,5 +222,6 @@ TYPE_ERRORS: tuple[tuple[str, Explain], ...] = (
         plainly("publish(…) is given what is no message, but of a {1} type", "write `pub.publish(msg)`"),
     ),
     (r"(?:ConstPtr|Ptr|shared_ptr).* has no member named '(\w+)'", _no_arrow),
+    (rf"'{_OWNER}' has no member named '(?P<field>\w+)'", _no_field),
 )
 """Errors by what they say; each is tried before those of `cpp_errors.CPP_ERRORS`."""
