@@ -67,7 +67,12 @@ def cite_source(
     made = line_that_makes(lines, found[0]) if is_sent and len(found) == 1 else None
     places = (FileCitation(file=one.file, line=one.number) for one in (made, *found) if one is not None)
     hint = verdict.hint + _second_call(criterion, found[0], lines)
+    if criterion.check == "stamps" and (sent := _SENDS.search(found[0].text)):
+        hint = hint.replace(": msg.", f": {sent[1]}.")
     return verdict.model_copy(update={"citations": (*places, *verdict.citations), "hint": hint})
+
+
+_SENDS = re.compile(r"\bpublish\(\s*([\w.]+)\s*\)")
 
 
 def _second_call(criterion: Criterion, first: SourceLine, lines: Iterable[SourceLine]) -> str:
