@@ -6,8 +6,9 @@ fields of a type, there may be others: then only a name that is all but one of t
 
 from __future__ import annotations
 
+import math
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import PurePosixPath
 from typing import Any, NamedTuple, TypeGuard
@@ -16,9 +17,10 @@ from grader.checks.support.fields import PATH_PARTS, is_number
 from grader.evidence.decode import full_definition
 from grader.evidence.definitions import Field, Types, parse
 from grader.evidence.message_values import ANGLES, CLOCKS, FORMS, NOW, MessageType
-from grader.model.message_definitions import DIVIDER, PARTS, integer_limits
+from grader.model.message_definitions import DIVIDER, NOT_FINITE, PARTS, integer_limits
 from grader.ros_env import ros_packages
-from grader.rubric.yaml_lines import KeyPath, WrittenRubric, as_map, parts_of, services_in
+from grader.rubric.scenario import Publish
+from grader.rubric.yaml_lines import KeyPath, WrittenRubric, as_list, as_map, items_in, parts_of, services_in
 from grader.wording import closest, did_you_mean, is_one_edit, join_words
 
 ALMOST = 0.87
@@ -44,6 +46,72 @@ def instead_of(name: str, there: Iterable[str]) -> str:
 def is_form(value: Any) -> TypeGuard[dict[str, Any]]:  # noqa: ANN401 - any part of a message
     """Return whether a value is made for each message, as `{from: 0, to: 1}` is."""
     return isinstance(value, dict) and bool(value) and {*FORMS, ANGLES}.issuperset(value)
+
+
+def sent_in_turn(publish: Mapping[str, Any]) -> list[Any]:
+    """Return the values that a probe or a step sends, one after the other; `{each: …}` has another item in each
+    message."""
+    listed = publish.get("values")
+    values = listed if isinstance(listed, list) else [publish["value"]] if "value" in publish else []
+    most = max((len(items) for _, items in each_in((), values)), default=1)
+    if most == 1 or not values:
+        return values
+    total, rate_hz = publish.get("count"), publish.get("rate_hz", Publish.model_fields["rate_hz"].default)
+    if is_number(duration_s := publish.get("duration_s")) and is_number(rate_hz):
+        total = max(1, round(duration_s * rate_hz))
+    elif total is None:
+        total = math.inf if publish.get("background") is True else len(values)
+    number = min(len(values) * most, total) if is_number(total) else 1
+    return [_at_turn(values[turn % len(values)], turn) for turn in range(int(number))]
+
+
+def each_in(path: KeyPath, value: object) -> Iterator[tuple[KeyPath, list[Any]]]:
+    """Yield where in a value `{each: …}` is, and its items."""
+    for key, inner in items_in(value):
+        if key == "each" and isinstance(inner, list) and inner:
+            yield (*path, key), inner
+        yield from each_in((*path, key), inner)
+
+
+def _at_turn(value: Any, turn: int) -> Any:  # noqa: ANN401 - any part of a message
+    """Return a value as the message of this number has it, counted from 0."""
+    if (
+        isinstance(value, dict)
+        and set(value) == {"each"}
+        and isinstance(value["each"], list)
+        and value["each"]
+    ):
+        return _at_turn(value["each"][turn % len(value["each"])], turn)
+    if isinstance(value, dict):
+        return {key: _at_turn(inner, turn) for key, inner in value.items()}
+    return [_at_turn(inner, turn) for inner in value] if isinstance(value, list) else value
+
+
+class TooShort(ValueError):
+    """A list that is sent has no item of that number."""
+
+
+def values_at(value: object, parts: Sequence[str]) -> list[Any] | None:
+    """Return what a value that is sent has at a path; None where a form makes it another each time. Raises TooShort."""
+    part = parts[0] if parts else ""
+    if is_form(value):
+        count, is_item = value.get("count"), part[:1] == "[" and part != "[*]"
+        if is_item and isinstance(count, int) and int(part[1:-1]) >= count:
+            raise TooShort(count)
+        return None
+    if not parts:
+        return [NOT_FINITE.get(value, value) if isinstance(value, str) else value]
+    if part[0] != "[":
+        # Fields that are left out are zero.
+        inside = value.get(part, {} if parts[1:] else 0) if isinstance(value, dict) else None
+        return None if inside is None else values_at(inside, parts[1:])
+    items = as_list(value)
+    if part == "[*]":
+        each = [values_at(item, parts[1:]) for item in items]
+        return None if None in each else [one for found in each for one in found or ()]
+    if int(part[1:-1]) >= len(items):
+        raise TooShort(len(items))
+    return values_at(items[int(part[1:-1])], parts[1:])
 
 
 class Misfit(ValueError):

@@ -9,8 +9,9 @@ from pydantic import ValidationError
 
 from grader.checks.rate import RateParams
 from grader.checks.support.conditions import Condition
-from grader.checks.support.fields import Reading, is_number
-from grader.rubric.scenario import ROSTEST_ENDING, Action, Probe, Scenario, Step, Until
+from grader.checks.support.fields import PATH_PARTS, Reading, is_number
+from grader.rubric.definitions import TooShort, sent_in_turn, values_at
+from grader.rubric.scenario import ROSTEST_ENDING, Action, Probe, Publish, Scenario, Step, Until
 from grader.rubric.yaml_lines import (
     Fault,
     KeyPath,
@@ -28,6 +29,8 @@ FASTEST_HZ = 100
 """No lab asks for rows of a table, or feedback, more often than this."""
 SUBSCRIBE_S, ANSWER_S = 6.0, 10.0
 """How long a run waits for a subscriber of one more topic, and for the answer of a service."""
+MESSAGES_SEEN = 10_000
+"""Of so many messages of a step it is asked what they show."""
 CONNECTED = frozenset({"connected", "launch-connects", "launch-runs"})
 """Checks of the connections between nodes."""
 CONDITIONS = frozenset(
@@ -258,43 +261,104 @@ def answer_faults(about: WrittenCriterion) -> Iterator[Fault]:
 
 
 def stretch_faults(about: WrittenCriterion) -> Iterator[Fault]:
-    """Yield rates that are judged while something is so that the run's steps keep up for too short a time."""
+    """Yield what is judged while something is so, or after it, where the run's steps give it too little time."""
+    given, at = about.given, (*about.at, "within_s")
+    within_s, window_s = (
+        given.get(key, RateParams.model_fields[key].default) for key in ("within_s", "min_window_s")
+    )
     try:
-        params = RateParams.model_validate(about.given) if about.check == "rate" else None
+        cause = Condition.model_validate(given.get("cause")) if about.check in {"rate", "reacts"} else None
     except ValidationError:  # said elsewhere
-        params = None
-    if params is None or params.cause is None:
         return
-    longest = _kept_up_s(params.cause, about.scenario)
-    needs_s = params.within_s + params.min_window_s
-    if longest and longest < needs_s:
-        keeps = f"{about.run} keeps {params.cause.words} up for {significant(longest)} s at most"
+    lasting = None if cause is None else _lasting_s(cause, about.scenario)
+    if cause is None or lasting is None or not is_number(window_s) or not is_number(within_s):
+        return
+    kept_s, left_s = (significant(one) for one in lasting)
+    if about.check == "rate" and lasting[0] < (needs_s := within_s + window_s):
+        keeps = f"{about.run} keeps {cause.words} up for {kept_s} s at most"
         takes = f"within_s and min_window_s are {significant(needs_s)} s"
-        yield (*about.at, "within_s"), f"{keeps}, and {takes}: let a step wait for longer"
+        yield at, f"{keeps}, and {takes}: let a step wait for longer"
+    elif about.check == "reacts" and given.get("never") is True and lasting[0] <= within_s:
+        keeps = f"{about.run} keeps {cause.words} up for {kept_s} s at most"
+        yield at, f"{keeps}: after {within_s:g} s there is no time left in which silence is asked for"
+    elif about.check == "reacts" and given.get("never") is not True and lasting[1] < within_s:
+        ends = f"{about.run} ends {left_s} s at most after {cause.words}, and an answer is missed only after"
+        yield at, f"{ends} {within_s:g} s: let a last step wait for longer"
 
 
-def _kept_up_s(cause: Condition, scenario: dict[str, Any]) -> float | None:
-    """Return for how long the longest time the steps of a run keep a condition up; None where they do not send it, or
-    nobody knows how long they last."""
-    steps, until = _read_steps(scenario), as_map(scenario.get("until"))
-    if steps is None or steps_s(scenario) is None or until.keys() - {*LASTING, "limit_s"}:
+def _lasting_s(cause: Condition, scenario: dict[str, Any]) -> tuple[float, float] | None:
+    """Return how long the steps of a run keep a condition up at most, and how long the run lasts from the first time
+    that it begins; None where they do not send it, or nobody knows."""
+    steps, warp, first_s = _read_steps(scenario), warp_of(scenario), until_of(scenario, "first_message_s")
+    written = [*as_maps(scenario.get("calls")), *as_maps(scenario.get("steps"))]
+    if steps is None or "probes" in scenario or not all(map(is_number, (warp, first_s))):
         return None
-    longest_s = lasting_s = 0.0
-    held: bool | None = None
-    for step in steps:
-        if step.published is not None and step.published.topic == cause.topic:
-            holds = _holds(cause, step.published.value)
-            if holds is None:
-                return None
-            lasting_s, held = (lasting_s if holds == held else 0.0), holds
-        lasting_s += step.lasts_s
-        longest_s = max(longest_s, lasting_s if held else 0.0)
-    after_s = max((until[key] for key in LASTING if is_number(until.get(key))), default=0.0)
-    return None if held is None else max(longest_s, lasting_s + after_s if held else 0.0)
+    now_s = longest_s = 0.0
+    began_s: float | None = None
+    first: float | None = None
+    for step, (_, one) in zip(steps, written, strict=True):
+        shown = _shown_by(cause, step, one)
+        if shown is None or step.play:
+            return None
+        for number, holds in enumerate(shown):
+            if began_s is not None and not holds:
+                longest_s = max(longest_s, now_s + number * _period_s(step) - began_s)
+                began_s = None
+            elif began_s is None and holds:
+                began_s = now_s + number * _period_s(step)
+                first = began_s if first is None else first
+        is_waiting = step.action or (step.wait is not None and step.wait.seconds is None)
+        now_s += step.lasts_s + (warp * _waits_s(step, first_s) if is_waiting else 0.0)
+    if first is None or (after_s := _after_steps_s(scenario)) is None:
+        return None
+    end_s = now_s + after_s
+    return max(longest_s, end_s - began_s if began_s is not None else 0.0), end_s - first
+
+
+def _after_steps_s(scenario: dict[str, Any]) -> float | None:
+    """Return how long a run lasts at most after its last step."""
+    until, limit_s = as_map(scenario.get("until")), until_of(scenario, "limit_s")
+    if "until" not in scenario:
+        return 0.0
+    if until.keys() <= {*LASTING, "limit_s"} and set(LASTING) & until.keys():
+        lasting = [until[key] for key in LASTING if is_number(until.get(key))]
+        return max(lasting, default=None)
+    return limit_s * warp_of(scenario) if is_number(limit_s) else None
+
+
+def _period_s(step: Step) -> float:
+    return 1 / step.published.rate_hz if step.published is not None else 0.0
+
+
+def _shown_by(cause: Condition, step: Step, written: dict[str, Any]) -> list[bool] | None:
+    """Return of each message that a step sends on the topic of a condition, or of its call of that service, whether it
+    holds; None where nobody knows."""
+    if step.call is not None and step.call.service == cause.topic:
+        values: list[Any] = [step.call.request]
+    elif isinstance(step.published, Publish) and step.published.topic == cause.topic:
+        values = sent_in_turn(as_map(written.get("publish")))
+        # Each once more and again, as long as the step sends.
+        total = None if step.published.background else step.published.total
+        values = (
+            [values[n % len(values)] for n in range(min(total, MESSAGES_SEEN))] if total and values else []
+        )
+        if not values:
+            return None
+    else:
+        return []
+    found = [_holds(cause, one) for one in values]
+    return None if None in found else [one is True for one in found]
 
 
 def _holds(cause: Condition, value: object) -> bool | None:
     """Return whether a condition is true of a message that a step sends; None where its field is not plain there."""
-    for part in (cause.field or "").split("."):
-        value = value.get(part, 0) if isinstance(value, dict) else value if part == "data" else None
-    return cause.holds(Reading(0, (value,), "")) if isinstance(value, int | float | str) else None
+    if cause.field is None:
+        return True
+    try:
+        found = values_at(
+            value if isinstance(value, dict) else {"data": value}, PATH_PARTS.findall(cause.field)
+        )
+    except TooShort:
+        return None
+    is_plain = found is not None and all(isinstance(one, int | float | str) for one in found)
+    return cause.holds(Reading(0, tuple(found or ()), "")) if is_plain else None

@@ -13,7 +13,7 @@ from pydantic import ValidationError
 from grader.checks.registry import Check
 from grader.checks.support.conditions import Condition
 from grader.checks.support.fields import PATH_PARTS, Reading, is_number
-from grader.rubric.definitions import is_form
+from grader.rubric.definitions import TooShort, sent_in_turn, values_at
 from grader.rubric.durations import (
     answer_faults,
     early_faults,
@@ -158,10 +158,6 @@ def _too_few(criteria: Sequence[WrittenCriterion]) -> Iterator[Fault]:
             yield (*path, "rate_hz"), f"{each}: it is messages a second"
 
 
-class TooShort(ValueError):
-    """A list that is sent has no item of that number."""
-
-
 def _sent_on(topic: str, scenario: dict[str, Any]) -> list[Any] | None:
     """Return all that is sent on a topic, or asked of a service; None where something else may be."""
     sent = [one for one in published_in(scenario) if one.get("topic") == topic]
@@ -170,37 +166,10 @@ def _sent_on(topic: str, scenario: dict[str, Any]) -> list[Any] | None:
     # These are made up when the run begins.
     if any(one.get(key) for one in sent for key in ("text", "integers", "among")):
         return None
-    values = [
-        value
-        for one in sent
-        for value in (*as_list(one.get("values")), *([one["value"]] if "value" in one else []))
-    ]
+    values = [value for one in sent for value in sent_in_turn(one)]
     calls = [one for _, kind, one in parts_of(scenario) if kind == "call" and one.get("service") == topic]
     values += [as_map(one.get("request")) for one in calls]
     return [value if isinstance(value, dict) else {"data": value} for value in values]
-
-
-def _values_at(value: object, parts: Sequence[str]) -> list[Any] | None:
-    """Return what a value that is sent has at a path; None where a form makes it another each time. Raises TooShort."""
-    part = parts[0] if parts else ""
-    if is_form(value):
-        count, is_item = value.get("count"), part[:1] == "[" and part != "[*]"
-        if is_item and isinstance(count, int) and int(part[1:-1]) >= count:
-            raise TooShort(count)
-        return None
-    if not parts:
-        return [value]
-    if part[0] != "[":
-        # Fields that are left out are zero.
-        inside = value.get(part, {} if parts[1:] else 0) if isinstance(value, dict) else None
-        return None if inside is None else _values_at(inside, parts[1:])
-    items = as_list(value)
-    if part == "[*]":
-        each = [_values_at(item, parts[1:]) for item in items]
-        return None if None in each else [one for found in each for one in found or ()]
-    if int(part[1:-1]) >= len(items):
-        raise TooShort(len(items))
-    return _values_at(items[int(part[1:-1])], parts[1:])
 
 
 def _never_sent(about: WrittenCriterion, others: Sequence[WrittenCriterion]) -> Iterator[Fault]:
@@ -217,7 +186,7 @@ def _never_sent(about: WrittenCriterion, others: Sequence[WrittenCriterion]) -> 
         if not sent or any(one.given.get("topic") == topic and one.check != "hears" for one in others):
             continue
         lengths = [_length(value, parts) for value in sent]
-        found = [_values_at(one, parts) if n is None else [] for one, n in zip(sent, lengths, strict=True)]
+        found = [values_at(one, parts) if n is None else [] for one, n in zip(sent, lengths, strict=True)]
         # Each list is too short, not only some: a longer one may be the one that is meant.
         if None not in lengths:
             most = plural(max(n for n in lengths if n is not None), "item")
@@ -232,7 +201,7 @@ def _never_sent(about: WrittenCriterion, others: Sequence[WrittenCriterion]) -> 
 def _length(value: object, parts: Sequence[str]) -> int | None:
     """Return how many items a list has that is too short; None where it is long enough."""
     try:
-        _values_at(value, parts)
+        values_at(value, parts)
     except TooShort as error:
         return int(error.args[0])
     return None
@@ -458,7 +427,7 @@ def _is_so(cause: dict[str, Any], value: object) -> bool:
     condition, parts = _condition(cause), PATH_PARTS.findall(str(cause.get("field")))
     if condition is None or "field" not in cause or _length(value, parts) is not None:
         return False
-    found = _values_at(value, parts)
+    found = values_at(value, parts)
     return (
         bool(found)
         and all(map(is_number, found or ()))

@@ -18,6 +18,7 @@ from grader.evidence.message_values import FIRST, OTHER_TEXTS, MessageType, Serv
 from grader.installable import noetic_messages
 from grader.model.message_definitions import NOT_FINITE
 from grader.ros_env import ros_packages
+from grader.rubric.definitions import each_in, sent_in_turn
 from grader.rubric.durations import FASTEST_HZ, longest_s
 from grader.rubric.fault_words import model_faults
 from grader.rubric.scenario import STEP_S_MAX, Action, Play, Step, Transform
@@ -27,7 +28,6 @@ from grader.rubric.yaml_lines import (
     Fault,
     KeyPath,
     WrittenRubric,
-    as_list,
     as_map,
     as_maps,
     as_texts,
@@ -203,6 +203,10 @@ def _publish(at: KeyPath, publish: dict[str, Any], types: dict[str, str]) -> Ite
         yield at, "give count or duration_s, not both"
     if isinstance(listed, list) and isinstance(count, int) and 0 < count < len(listed):
         yield (*at, "count"), f"only {count} of the {len(listed)} values are sent"
+    elif most := max((len(items) for _, items in each_in((), publish)), default=0):
+        sent = len(sent_in_turn(publish))
+        if sent < most:
+            yield at, f"only {sent} of the {most} items of each are sent: write count: {most}"
     if not isinstance(topic, str) or not isinstance(kind, str) or "/" not in kind:
         return
     if types.setdefault(topic, kind) != kind:
@@ -442,5 +446,5 @@ def count_causes(scenario: dict[str, Any]) -> int | None:
     if "probes" in scenario or any("background" in one or "from" in str(one.get("value")) for one in sent):
         return None
     done = [step for step in steps if not {"wait", "publish"} & step.keys()]
-    messages = sum(len(as_list(one["values"])) if "values" in one else 1 for one in sent)
+    messages = sum(len(sent_in_turn(one)) for one in sent)
     return messages + len(done) + len(as_maps(scenario.get("calls")))

@@ -71,6 +71,13 @@ FRAMES = """\
           type: nav_msgs/Odometry
           value: {header: {stamp: now, frame_id: odom}, child_frame_id: base_link, pose: {pose: {orientation: {w: 1}}}}
       - wait: {seconds: 1}"""
+TURNS = """\
+  turns:
+    title: Turns
+    start: [{name: clean, script: clean.py}]
+    steps:
+      - publish: {topic: /level, type: std_msgs/Float64, value: {each: [1, .nan, 3, 2]}, count: 4, rate_hz: 2}
+      - wait: {seconds: 1}"""
 
 
 @pytest.mark.parametrize(
@@ -98,6 +105,10 @@ FRAMES = """\
         # a factor of a formula is no value that a node may always use
         ("wheels hears /turn, in radians a second, and publishes turn / 2 on /right", WHEELS,
          ["check: field-equals, with: {topic: /right, field: data, value: {made_up: right}}, scenario: turns"]),
+        # each message of a step is a cause of its own
+        ("clean answers each reading on /level, a std_msgs/Float64, with one on /clean; NaN is left out", TURNS,
+         ["check: field-equals, with: {topic: /clean, field: data, values: [1, 3, 2]}, scenario: turns",
+          "check: reacts, scenario: turns, with: {cause: {topic: /level}, effect: {topic: /clean}, within_s: 0.5}"]),
         # a robot without wheels
         ("a quadrotor starts: the node maps publishes geometry_msgs/Twist on /cmd_vel",
          GROWS.replace("/map", "/cmd_vel"),
