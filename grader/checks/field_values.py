@@ -43,8 +43,16 @@ from grader.checks.support.topics import SYSTEM_TOPICS, Sender, cite, nothing_se
 from grader.evidence.run import Run
 from grader.model.message_definitions import NOT_FINITE
 from grader.model.package import PackageFacts
-from grader.model.verdict import EvidenceCitation, Verdict, failed, failed_or_blocked, grade_again, passed
-from grader.wording import join_words, plural, significant
+from grader.model.verdict import (
+    EvidenceCitation,
+    Status,
+    Verdict,
+    failed,
+    failed_or_blocked,
+    grade_again,
+    passed,
+)
+from grader.wording import LISTED_MAX, join_words, plural, significant
 
 VALUES_SHOWN = 4
 
@@ -145,7 +153,7 @@ def _outside(
         f"{params.field} of {params.topic} is not {params.words} {count}: it {seen}, {after} after the first"
     )
     verdict = failed(message, hint=f"make sure that {params.field} is {params.words} before you publish it")
-    return verdict.of_value(nan=True) if wrong and math.isnan(wrong[0]) else verdict
+    return _of_nan(verdict, run) if wrong and math.isnan(wrong[0]) else verdict
 
 
 def _share(readings: Sequence[Reading], outside: Sequence[Reading]) -> str:
@@ -278,9 +286,8 @@ def _in_order(
             verdict = _in_another_order(found, params)
             break
         if here is None:
-            if number and (told := begins_later(found, params.values, params.is_at)):
-                first = value_text(params.values[0])
-                verdict = failed(f"{what} {told}", hint=f"publish {first} first").if_repeated()
+            if late := _begins_late(found, params, is_first=number == 0):
+                verdict = late.if_repeated()
                 break
             before = f" after {value_text(params.values[number - 1])}" if number else ""
             came = f"what comes{' then' if number else ''} is {_values(found[at:])}"
@@ -300,8 +307,46 @@ def _in_order(
         at = here + 1
     else:
         verdict = _said_again(found, params) or verdict
+    is_wanted = any(map(_has_nan, params.values))
+    if verdict.status is Status.FAIL and not is_wanted and any(_has_nan(one.values) for one in found[at:]):
+        verdict = _of_nan(verdict, run)
     cited = (_span(run, found, params),)
     return verdict.about(expected=f"{what} {params.words}", measured=_values(sent), citations=cited)
+
+
+def _of_nan(verdict: Verdict, run: Run) -> Verdict:
+    """Return the loss as one on NaN; with what to do about it, where the grader had sent one."""
+    sent = (c for c in run.channels if c.by_grader and c.topic not in SYSTEM_TOPICS)
+    topic = next((c.topic for c in sent if any(map(_has_nan, c.values))), "")
+    if topic:
+        hint = f"leave such a value out: in the callback of {topic}, ask `math.isnan(…)` first"
+        why = f"a message on {topic} had NaN, and what is worked out with NaN is NaN"
+        verdict = verdict.explained(why, hint)
+    return verdict.of_value(nan=True)
+
+
+def _has_nan(value: object) -> bool:
+    """Return whether a number in a message is NaN."""
+    inner = value.values() if isinstance(value, dict) else value if isinstance(value, list | tuple) else ()
+    return (isinstance(value, float) and math.isnan(value)) or any(map(_has_nan, inner))
+
+
+def _begins_late(found: Sequence[Reading], params: FieldEqualsParams, *, is_first: bool) -> Verdict | None:
+    """Return the loss where the values are right but for the first, or for several that are missing at the beginning;
+    `is_first`: the first value never comes."""
+    what, values = f"{params.field} of {params.topic}", params.values
+    if not is_first and (told := begins_later(found, values, params.is_at)):
+        return failed(f"{what} {told}", hint=f"publish {value_text(values[0])} first")
+    missing = len(values) - len(found)
+    if not is_first or not found or missing <= 0 or not all(map(params.is_at, found, values[missing:])):
+        return None
+    first = (
+        f"the first {missing} of the {len(values)} values are missing"
+        if missing > 1
+        else "one value is missing"
+    )
+    hint = "look at what keeps the node from publishing at the beginning"
+    return failed(f"{what} begins with {_values(found[:1])}: {first} before it", hint=hint)
 
 
 def _said_again(found: Sequence[Reading], params: FieldEqualsParams) -> Verdict | None:
@@ -320,6 +365,9 @@ def _in_another_order(found: Sequence[Reading], params: FieldEqualsParams) -> Ve
     number, value = next((n, value) for n, (one, value) in pairs if not params.is_at(one, value))
     came = join_words([_values([one]) for one in found], "then")
     message = f"{params.field} of {params.topic} is {came}, not {params.words}"
+    if len(found) > LISTED_MAX:  # what differs may not be among those that are listed
+        came = f"{_values([found[number - 1]])} in message {number} of {len(found)}"
+        message = f"{params.field} of {params.topic} is {came}, not {value_text(value)}"
     return failed(message, hint=f"set {params.field} to {value_text(value)} in message {number}")
 
 

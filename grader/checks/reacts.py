@@ -27,12 +27,15 @@ from grader.checks.support.scans import SCAN, has_angles, looks_elsewhere, read_
 from grader.checks.support.services import exchanges, no_answer, not_offered, offers
 from grader.checks.support.text import near_names
 from grader.checks.support.topics import (
+    Sender,
     cite,
     misfit,
     no_message,
     no_node,
+    nothing_sent,
     published_topics,
     refused_type,
+    sent_by,
     unheard,
 )
 from grader.evidence.events import NOT_OFFERED
@@ -66,6 +69,9 @@ class ReactsParams(Record):
     never: bool = False
     """The other way around: whether no effect may come, from `within_s` after the cause begins and for as long as it is
     true. Without a `field`, it is true from its first message until the run ends."""
+    of: Sender = "student"
+    """Whose effects count: the `student`'s nodes', those of a `program` that the scenario starts beside them, such as
+    what a simulator measures while the student's node drives it, or `anyone`'s."""
     not_before: bool = True
     """Whether an effect before the first cause is wrong: one from `within_s` after a message for which the cause is
     not true. Publish such messages for about three times `within_s` first, so that there is something to see."""
@@ -118,11 +124,12 @@ def reacts(package: PackageFacts, run: Run, params: ReactsParams) -> Verdict:
     if params.never:
         return _judge_silence(package, run, params)
     causes = _causes(run, params)
-    own = run.student_channels(params.effect.topic)
+    own = sent_by(run, params.effect.topic, params.of)
     # what a node sends as it ends answers nothing
     effects = [e for e in params.effect.read(own) if e.time_ns <= (observed_until_ns(run) or run.end_ns)]
     answers = _answers(run, causes, effects, params)
     instead = _instead(causes, effects, params) or _other_answer(answers, causes, effects, own, params)
+    instead = instead if params.of == "student" else None
     verdict = (
         # Whether an answer is missing can be said only where effects and causes were there to be seen.
         _nothing_to_judge(package, run, effects, own, params)
@@ -222,7 +229,7 @@ def _nothing_to_judge(
     if unknown := no_clock(run):
         return unknown
     if not effects:
-        return no_message(package, run, params.effect.topic)
+        return nothing_sent(package, run, params.effect.topic, params.of)
     if params.effect.field is not None and not any(one.values for one in effects):
         return no_field(effects[0], own)
     return None
@@ -324,7 +331,7 @@ def _unless_late(
 
 def _judge_silence(package: PackageFacts, run: Run, params: ReactsParams) -> Verdict:
     """Return the verdict where no effect may come, while the cause is true or in the whole run."""
-    own = run.student_channels(params.effect.topic)
+    own = sent_by(run, params.effect.topic, params.of)
     causes, effects = _causes(run, params), params.effect.read(own)
     spans = _silent_spans(causes, run, params)
     verdict = (
@@ -373,6 +380,8 @@ def _disturbed(
     when = f"{to_s(came[0]) - to_s(from_ns):.2f} s after {params.cause.words if params.cause else 'the run began'}"
     message = f"{params.effect.words} comes {when}, where none may come"
     hint = f"before you publish on {params.effect.topic}, check whether the node may do so now"
+    if params.effect.field and not all(map(params.effect.holds, effects)):
+        hint = f"look at the condition for {params.effect.words}: it holds too early, too long or without a reason"
     if params.cause and params.effect.field and all(map(params.effect.holds, effects)):
         message += f"; all {plural(len(effects), 'message')} on {params.effect.topic} have it"
         hint = (
@@ -478,7 +487,11 @@ def _other_answer(
     came = next((one for one in effects if one.time_ns >= at_ns and one.values), None)
     if came is None or params.effect.value is None or any(map(params.effect.holds, effects)):
         return None
-    later = next((one.time_ns for one in causes if one.time_ns > at_ns), math.inf)
+    rest = [one for one in causes if one.time_ns > at_ns]
+    later = next(
+        (one.time_ns for one in rest if params.trigger.field is None or not params.trigger.holds(one)),
+        math.inf,
+    )
     if came.time_ns >= later and len(effects) < len(causes):
         hint = f"in the callback of {params.trigger.topic}, publish in each case: see that `publish(…)` stands below"
         return (
@@ -486,7 +499,16 @@ def _other_answer(
             f"{hint} the `if` and its `else`, not in one of them",
         )
     field = params.effect.field
-    hint = f"in the callback of {params.trigger.topic}, look at what you publish on {params.effect.topic}: "
+    # What mostly comes a while after any message was not published in the callback.
+    times = [one.time_ns for one in causes]
+    at_once = [
+        n
+        for one in effects
+        if (n := bisect(times, one.time_ns)) and one.time_ns - times[n - 1] < ORDER_S * 1e9
+    ]
+    is_answer = 2 * len(at_once) > len(effects) > len(causes) / 4
+    where = f"in the callback of {params.trigger.topic}, " if is_answer else ""
+    hint = f"{where}look at what you publish on {params.effect.topic}: "
     fix, wanted = f"{hint}{field} has to be {value_text(params.effect.value)}", params.effect.value
     last = next((one for one in reversed(effects) if one.time_ns < at_ns), came)
     if last is not came and all(one.values == came.values for one in effects):
@@ -504,6 +526,8 @@ def _judge_unanswered(
 ) -> Verdict | None:
     hint = f"each time that {params.trigger.words} comes, publish {params.effect.words}"
     hint = f"{hint}, in the callback of {params.trigger.topic}"
+    if params.of != "student":
+        hint = f"look at what your node publishes once {params.trigger.words} comes: {params.effect.words} comes of it"
     if not answers and (unsent := misfit(run, params.trigger.topic)):
         return unsent
     deaf = refused_type(run, params.trigger.topic) or unheard(run)
