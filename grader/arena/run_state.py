@@ -127,7 +127,8 @@ class RunState:
     # --- What the grader sends, and hears of it ---
 
     sent_s: float = 0.0
-    """When the grader last sent a message; `last_sent_s`, one that is to be printed."""
+    """When the grader last sent a message, called a service, set a parameter or typed; `last_sent_s`, when it sent a
+    message that is to be printed."""
     last_sent_s: float = 0.0
     unheard: dict[str, re.Pattern[str]] = field(default_factory=dict)
     """Values that are to be printed and were not, and how each is found in a line."""

@@ -147,6 +147,7 @@ class StepRunner:
             about = step.set_param
             record = {"action": "set_param", "actor": "grader", "topic": about.name, "value": about.value}
             self._arena.send(do="set_param", name=about.name, value=about.value, record=record)
+            self._note_deed()
         if step.wait is not None:
             await self._wait(step.wait)
         if step.call is not None:
@@ -164,6 +165,10 @@ class StepRunner:
             await self._stop(name, "kill" if step.kill else "stop")
         if name := step.start or step.restart:
             self._start(name)
+
+    def _note_deed(self) -> None:
+        """Note that a node that has come to rest, or was switched off, may begin again."""
+        self._live.sent_s = time.monotonic()
 
     def is_over(self) -> bool:
         """Return whether nothing of the student's runs any more, nor will."""
@@ -215,7 +220,7 @@ class StepRunner:
         self, topic: str, value: object, index: int, total: int | None, deed: dict[str, Any] | None = None
     ) -> None:
         """Send one message, and note it as `deed`. Raises ValueError where the value does not fit."""
-        self._live.sent_s = time.monotonic()
+        self._note_deed()
         type_, moment = self._types[topic], Moment(index, total, self._arena.ros_now_ns())
         data, shown = type_.encode(value, moment), type_.shown(value, moment)
         # Only such a value can be found again in what a node prints.
@@ -443,6 +448,7 @@ class StepRunner:
             process = spec["name"]
             record = {"action": "type", "actor": "grader", "detail": process, "value": typed.line}
             self._arena.send(do="type", name=process, data=data, record=record)
+            self._note_deed()
 
     def _specs(self, name: str) -> list[ProcessSpec]:
         return [spec for start, spec in self._starts if start.name == name]
@@ -480,6 +486,7 @@ class StepRunner:
             return
         about = {"topic": call.service, "type": call.type, "value": shown}
         record = {"action": "call", "actor": "grader", **about}
+        self._note_deed()
         encoded = base64.b64encode(data).decode()
         limit_s = ANSWER_S if call.limit_s is None else call.limit_s
         # A second call of a service that is silent: it is given less, and never all of the rubric's own time.
@@ -493,6 +500,7 @@ class StepRunner:
                 self._in_vain.add(call.service)
             self._answer(call, None, answer["error"])
             return
+        self._note_deed()
         value = types.response.decode(base64.b64decode(answer["data"]))
         self._answer(call, value, "" if value is not None else f"the answer is not a {call.type}")
 

@@ -212,6 +212,37 @@ FRAMES = (
 )
 
 
+@pytest.mark.parametrize("switch", ["call", "set_param", "type"])
+def test_what_is_switched_on_again_is_waited_for(tmp_path: Path, switch: str) -> None:
+    """It has been silent for so long that it has come to rest."""
+    beats = NODE + (
+        "import sys, threading\nfrom std_msgs.msg import Int8\nfrom std_srvs.srv import SetBool\n"
+        "rospy.init_node('beats')\npub = rospy.Publisher('n', Int8, queue_size=10)\nsent = 0\nis_on = True\n"
+        "def turn(request):\n    global is_on\n    is_on = request.data\n    return is_on, ''\n"
+        "def read():\n    for line in sys.stdin:\n        rospy.set_param('/on', True)\n"
+        "rospy.Service('turn', SetBool, turn)\nthreading.Thread(target=read, daemon=True).start()\n"
+        "rate = rospy.Rate(5)\nwhile not rospy.is_shutdown():\n"
+        "    if is_on and (sent < 8 or rospy.get_param('/on', False)):\n        pub.publish(sent)\n        sent += 1\n"
+        "    rate.sleep()\n"
+    )
+    turn = {"service": "/turn", "type": "std_srvs/SetBool"}
+    on: dict[str, dict[str, Any]] = {
+        "call": {"call": {**turn, "request": {"data": True}}},
+        "set_param": {"set_param": {"name": "/on", "value": True}},
+        "type": {"type": {"process": "beats", "line": "on"}},
+    }
+    before = [{"wait": {"topic": "/n", "messages": 6}}]
+    before += [{"call": turn}, {"set_param": {"name": "/on", "value": True}}] if switch == "call" else []
+    steps = [
+        *before,
+        {"wait": {"seconds": 4.5}},
+        on[switch],
+        {"wait": {"topic": "/n", "messages": 3, "new": True}},
+    ]
+    seen = _run(tmp_path, {"scripts/beats.py": beats}, steps)
+    assert ("/n", None, "3 messages came") in _did(seen, "wait")
+
+
 def test_transforms_parameters_and_calls_in_time(tmp_path: Path) -> None:
     moving = {"parent": "map", "child": "base", "rotation_deg": [0, 0, {"from": 0, "to": 90}]}
     turn = {"service": "/turn", "type": "std_srvs/SetBool"}
