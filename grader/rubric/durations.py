@@ -8,6 +8,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from grader.checks.rate import RateParams
+from grader.checks.reacts import ORDER_S
 from grader.checks.support.conditions import Condition
 from grader.checks.support.fields import PATH_PARTS, Reading, is_number
 from grader.rubric.definitions import TooShort, sent_in_turn, values_at
@@ -278,7 +279,7 @@ def stretch_faults(about: WrittenCriterion) -> Iterator[Fault]:
         keeps = f"{about.run} keeps {cause.words} up for {kept_s} s at most"
         takes = f"within_s and min_window_s are {significant(needs_s)} s"
         yield at, f"{keeps}, and {takes}: let a step wait for longer"
-    elif about.check == "reacts" and given.get("never") is True and lasting[0] <= within_s:
+    elif about.check == "reacts" and given.get("never") is True and lasting[0] <= within_s + ORDER_S:
         keeps = f"{about.run} keeps {cause.words} up for {kept_s} s at most"
         yield at, f"{keeps}: after {within_s:g} s there is no time left in which silence is asked for"
     elif about.check == "reacts" and given.get("never") is not True and lasting[1] < within_s:

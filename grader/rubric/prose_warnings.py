@@ -28,6 +28,7 @@ from grader.rubric.yaml_lines import (
 from grader.wording import join_words
 
 WORDS = {
+    "once": 1,
     "one": 1,
     "two": 2,
     "twice": 2,
@@ -43,6 +44,12 @@ _NUMBER = rf"\d+(?:\.\d+)?|{'|'.join(WORDS)}"
 PER_SECOND = re.compile(rf"\b({_NUMBER})(?: ?Hz\b|(?: \w+)? (?:a|per) second)", re.IGNORECASE)
 SHIFTS = (10, 100, 1000, 0.1, 0.01, 0.001, -1)
 """By so much a number is another where a digit is forgotten, the unit is a thousandth, or the sign is missing."""
+DEFAULTS = {
+    "counter-start": {"start": 0},
+    "counter-step": {"maximum": 127},
+    "counter-wrap": {"minimum": 0, "maximum": 127},
+}
+"""Numbers that a check has without being given them."""
 EXPECTED = ("value", "values", "numbers", "rate_hz", "result", "expect", "goal", "start", "min", "max",
             "translation", "tolerance_m", "cause", "effect")  # fmt: skip
 """Keys of what a criterion asks for, as numbers."""
@@ -437,7 +444,8 @@ def _numbers_of_title(criterion: WrittenCriterion, rubric: WrittenRubric) -> Ite
         return
     numbers = [float(one) for one in PLAIN_NUMBER.findall(title)]
     runs = list(rubric.scenarios.values())
-    there, texts = _numbers_within([given, runs]), " ".join(text for _, text in texts_in((), [given, runs]))
+    there = _numbers_within([DEFAULTS.get(criterion.check, {}) | given, runs])
+    texts = " ".join(text for _, text in texts_in((), [given, runs]))
     is_open = "made_up" in texts or not any(key in given for key in EXPECTED) or "launch" in given
     own = {number for _, number in numbers_in((), given)}
     is_open = is_open or any(round(number * by, 9) in own for number in numbers for by in SHIFTS)

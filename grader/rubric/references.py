@@ -33,6 +33,7 @@ from grader.rubric.yaml_lines import (
     as_maps,
     as_texts,
     given_steps,
+    parts_of,
     published_in,
     services_in,
     started_files,
@@ -86,6 +87,8 @@ def reference_faults(
     yield from unknown_names(rubric, checks)
     yield from reach_faults(rubric, checks)
     yield from _of_grader(rubric)
+    yield from _of_a_program(rubric)
+    yield from _sent_as_another_type(rubric)
     yield from _endless_causes(rubric)
     yield from _forgotten_topics(rubric.criteria)
     yield from _same_names(rubric)
@@ -296,6 +299,8 @@ def _of_grader(rubric: WrittenRubric) -> Iterator[Fault]:
             (("effect",), as_map(given.get("effect")).get("topic")),
             ((), (is_place or check in NEVER_OF_GRADER) and given.get("topic")),
         ):
+            if at and given.get("of", "student") != "student":
+                continue  # a simulator shows what the node does
             program = only_publisher(topic, scenario) if at and isinstance(topic, str) else ""
             if program:
                 fault = f"{program} publishes on {topic}: name the one on which the student's node answers"
@@ -311,6 +316,44 @@ def _of_grader(rubric: WrittenRubric) -> Iterator[Fault]:
         if check == "service" and service in _served_names(scenario):
             fault = f"the grader offers {service} itself (serves), and service judges the student's"
             yield (*path, "service"), f"{fault}: calls judges what was asked"
+
+
+def _of_a_program(rubric: WrittenRubric) -> Iterator[Fault]:
+    """Yield criteria on the student's messages on a topic on which another criterion judges those of a program."""
+    said = {
+        (of, topic): one.id
+        for one in rubric.criteria
+        for topic in (one.given.get("topic"), as_map(one.given.get("effect")).get("topic"))
+        if isinstance(of := one.given.get("of"), str) and isinstance(topic, str)
+    }
+    for criterion in rubric.criteria:
+        given = criterion.given
+        at = ("effect",) if criterion.check == "reacts" else ()
+        topic = as_map(given.get("effect")).get("topic") if at else given.get("topic")
+        is_beside = any("program" in one for one in starts_of(criterion.scenario))
+        other = said.get(("program", str(topic))) if is_beside else None
+        is_open = (
+            criterion.check in ASKED_OF_STUDENT
+            and given.get("of") is None
+            and ("student", str(topic)) not in said
+        )
+        if other and is_open:
+            of = "say whose it judges, of: program or of: student"
+            yield (*criterion.at, *at, "topic"), f"{other} judges what a program publishes on {topic}: {of}"
+
+
+def _sent_as_another_type(rubric: WrittenRubric) -> Iterator[Fault]:
+    """Yield messages of a run that have another type than on the same topic in a run of the same programs before."""
+    first: dict[str, tuple[str, str]] = {}
+    for name, scenario in rubric.scenarios.items():
+        for at, kind, one in parts_of(scenario):
+            topic, type_ = one.get("topic"), one.get("type")
+            if kind != "publish" or not isinstance(topic, str) or not isinstance(type_, str):
+                continue
+            run, other = first.setdefault(topic, (name, type_))
+            if run != name and other != type_ and _runs_alike(rubric.scenarios[run], scenario):
+                fault = f"{run} sends {other} on {topic}, to the same program: a topic has one type"
+                yield ("scenarios", name, *at, "type"), fault
 
 
 def _runs_alike(one: dict[str, Any], other: dict[str, Any]) -> bool:

@@ -76,6 +76,8 @@ def names_seen_once(rubric: WrittenRubric, folder: Path) -> Iterator[Fault]:
     for path, word, near in _misspelt_words(rubric, code=False):
         fault = f'nothing else in the rubric has the word {word}: did you mean "{near}", as in the handout?'
         yield path, fault
+    for path, word, near in _misspelt_words(rubric, code=True, part="scenarios"):
+        yield path, f"nothing else in the rubric has the word {word}: is `{near}` meant, as in the handout?"
 
 
 def misspelt_names(rubric: WrittenRubric, folder: Path) -> Iterator[Fault]:
@@ -103,16 +105,19 @@ def _package(rubric: WrittenRubric) -> Iterator[tuple[KeyPath, str, str]]:
             yield ("package",), package, near
 
 
-def _misspelt_words(rubric: WrittenRubric, *, code: bool) -> Iterator[tuple[KeyPath, str, str]]:
-    """Yield each word of a criterion's texts that no other line has, and the handout's word that is meant by it: one in
-    backticks, or with `code=False` any other."""
+def _misspelt_words(
+    rubric: WrittenRubric, *, code: bool, part: str = "criteria"
+) -> Iterator[tuple[KeyPath, str, str]]:
+    """Yield each word of a criterion's texts, or of those that a scenario sends, that no other line has, and the
+    handout's word that is meant by it: one in backticks, or with `code=False` any other."""
     handout = rubric.handout
     quoted = set(re.findall(_WORD, " ".join(re.findall(r"`([^`]+)`", handout))))
     known = quoted if code else set(re.findall(_WORD, handout)) - quoted
     for path, text in rubric.texts:
-        if path[0] != "criteria" or _key(path) not in WORDS or text == path[-1]:
+        if path[0] != part or _key(path) not in WORDS or text == path[-1]:
             continue
-        hints = re.findall(r"\"([^\"]+)\"|`([^`]+)`", str(rubric.data["criteria"][path[1]].get("hint") or ""))
+        hint = rubric.data["criteria"][path[1]].get("hint") if part == "criteria" else ""
+        hints = re.findall(r"\"([^\"]+)\"|`([^`]+)`", str(hint or ""))
         hinted = set(re.findall(_WORD, " ".join(map(" ".join, hints)))) if code else set[str]()
         # No placeholders of templates: `{number}`.
         for word in re.findall(rf"(?<![{{\w]){_WORD}(?![\w}}])", text):

@@ -397,6 +397,12 @@ def _easy(criterion: WrittenCriterion) -> Iterator[Fault]:
         if is_number(value) and is_number(off) and off >= abs(value) > 0 and "field" in asked:
             fault = f"is as large as the value, {value:g}: a field that is always 0 passes"
             yield (*place, "tolerance"), fault
+    values = [one for one in as_list(given.get("values")) if is_number(one)]
+    if len(values) > 1 and is_number(tolerance) and 2 * tolerance >= max(values) - min(values) > 0:
+        fault = (
+            f"one message between {min(values):g} and {max(values):g} is near enough to each of the values"
+        )
+        yield (*at, "tolerance"), f"{fault}: a field that never changes passes"
     if check == "field-bounds" and is_number(given.get("min")) and given.get("min") == given.get("max"):
         yield (*at, "max"), f"is min, too: only {given['min']:g} is within these bounds"
     if check == "stamps" and is_number(within_s := given.get("within_s")):
@@ -419,11 +425,13 @@ def _repeated(criterion: WrittenCriterion) -> Iterator[Fault]:
 
 
 def _there_already(criterion: WrittenCriterion) -> Iterator[Fault]:
-    """Yield a goal so near to the start that a robot of the robot world that never moves has reached it. In odometry,
-    its start is another."""
+    """Yield a goal so near to the start that a robot that never moves has reached it: in the robot world, or where the
+    student's node works out where it is, from (0, 0) on."""
     given, start = criterion.given, robot_of(criterion.scenario).get("start")
     goal, off_m = given.get("goal"), given.get("tolerance_m")
-    is_place = criterion.check == "ends-at" and given.get("topic") == TRUE_POSE
+    is_own = all(one.get("script") for one in starts_of(criterion.scenario))
+    start = [0, 0] if is_own else start  # where odometry begins
+    is_place = criterion.check == "ends-at" and (is_own or given.get("topic") == TRUE_POSE)
     if not is_place or not isinstance(start, list) or not isinstance(goal, list):
         return
     numbers = [*start[:2], *goal[:2]]

@@ -109,6 +109,9 @@ TURNS = """\
         ("clean answers each reading on /level, a std_msgs/Float64, with one on /clean; NaN is left out", TURNS,
          ["check: field-equals, with: {topic: /clean, field: data, values: [1, 3, 2]}, scenario: turns",
           "check: reacts, scenario: turns, with: {cause: {topic: /level}, effect: {topic: /clean}, within_s: 0.5}"]),
+        # a counter begins with 0 where nothing else is said
+        ("maps counts on /map, a std_msgs/Int8", GROWS,
+         ["check: counter-start, with: {topic: /map}, scenario: grows"]),
         # a robot without wheels
         ("a quadrotor starts: the node maps publishes geometry_msgs/Twist on /cmd_vel",
          GROWS.replace("/map", "/cmd_vel"),
@@ -128,12 +131,49 @@ TURNS = """\
 def test_a_rubric_of_an_unusual_lab_loads_without_a_word(
     handout: str, scenarios: str, asked: list[str], tmp_path: Path
 ) -> None:
+    assert _warnings(tmp_path, handout, scenarios, asked) == []
+
+
+def _warnings(tmp_path: Path, handout: str, scenarios: str, asked: list[str]) -> list[str]:
     share = [100 - 10 * len(asked[1:]), *(10 for _ in asked[1:])]
     criteria = [
-        f"  - {{id: c{n}, title: Part {chr(97 + n)}, points: {points}, {one}}}"
+        f"  - {{id: c{n}, title: Part {chr(97 + n)}{' of 0' * ('counter-start' in one)}, points: {points}, {one}}}"
         for n, (one, points) in enumerate(zip(asked, share, strict=True))
     ]
     path = tmp_path / "lab.yaml"
     text = RUNS.format(handout=f'"{handout}"', scenarios=scenarios, criteria="\n".join(criteria))
     path.write_text(text, encoding="utf-8")
-    assert warnings_of(load_rubric(str(path)), path.name) == []
+    return warnings_of(load_rubric(str(path)), path.name)
+
+
+SWITCH = """\
+  turns:
+    title: Turns
+    start: [{name: lamp, script: lamp.py}]
+    steps:
+      - publish: {topic: /turn, type: std_msgs/String, values: ["on", strat, dance]}
+      - wait: {seconds: 3}"""
+
+
+@pytest.mark.parametrize(
+    ("handout", "scenarios", "asked", "warning"),
+    [
+        # a command that the grader sends
+        ("lamp hears `on`, `start` and `stop` on /turn, and publishes a std_msgs/Bool on /lit", SWITCH,
+         ["check: field-equals, with: {topic: /lit, field: data, value: true, when: last}, scenario: turns"],
+         "turns.steps[0].publish.values[1]: nothing else in the rubric has the word strat: is `start` meant"),
+        # odometry that a script works out begins at the origin
+        ("clean hears a std_msgs/Float64 on /level, and drives; its odometry is on /odom", TURNS,
+         ["check: ends-at, with: {topic: /odom, goal: [0.3, 0], tolerance_m: 0.4}, scenario: turns"],
+         "with.tolerance_m: the robot starts 0.3 m from the goal: one that never moves passes"),
+        # all of them are near to one value
+        ("clean answers each reading on /level, a std_msgs/Float64, with one on /clean; NaN is left out", TURNS,
+         ["check: field-equals, with: {topic: /clean, field: data, values: [1, 3, 2], tolerance: 1}, scenario: turns"],
+         "with.tolerance: one message between 1 and 3 is near enough to each of the values"),
+    ],
+)  # fmt: skip
+def test_what_may_be_a_slip_in_one_is_a_warning(
+    tmp_path: Path, handout: str, scenarios: str, asked: list[str], warning: str
+) -> None:
+    (found,) = _warnings(tmp_path, handout, scenarios, asked)
+    assert warning in found
