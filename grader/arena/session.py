@@ -224,16 +224,20 @@ class ArenaSession:
             return {"error": f"{NO_ANSWER} {after_s:.3g} s"}
         return self._answers.pop(number)
 
-    async def wait(self, condition: Callable[[], bool], timeout_s: float) -> bool:
+    async def wait(self, condition: Callable[[], bool], timeout_s: float, *, exact: bool = False) -> bool:
         """Wait until the condition holds; False when it does not in time. Time that others took of a full machine does
-        not count. Raises ArenaError if the arena dies."""
-        # `lost_s` grows while others fill the machine, and moves the deadline with it.
-        deadline = time.monotonic() - self.live.lost_s + timeout_s
+        not count, unless the time is to be `exact`. Raises ArenaError if the arena dies."""
+
+        def now_s() -> float:
+            # `lost_s` grows while others fill the machine, and moves the deadline with it.
+            return time.monotonic() - (0.0 if exact else self.live.lost_s)
+
+        deadline = now_s() + timeout_s
         while True:
             self._raise_failure()
             if condition():
                 return True
-            left = deadline - (time.monotonic() - self.live.lost_s)
+            left = deadline - now_s()
             if left <= 0:
                 return False
             # Cleared after the condition was looked at, in one thread: no change can come between the two.

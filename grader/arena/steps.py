@@ -284,7 +284,7 @@ class StepRunner:
                 return
             # What came late is not caught up with: a burst would be another rate than the rubric's.
             due_ns = max(due_ns + round(NS / publish.rate_hz), self._arena.ros_now_ns())
-            await self._until(due_ns)
+            await self._until(due_ns, exact=True)
 
     async def has_subscriber(self, topic: str) -> bool:
         """Wait for one, once for each topic."""
@@ -367,7 +367,7 @@ class StepRunner:
         self._tell(f"playing {play.bag}")
         begun_ns = self._arena.ros_now_ns()
         for time_ns, topic, data in messages:
-            await self._until(begun_ns + round((time_ns - messages[0][0]) / play.speed))
+            await self._until(begun_ns + round((time_ns - messages[0][0]) / play.speed), exact=True)
             if not self._live.running:
                 return
             self._live.sent_s = time.monotonic()
@@ -375,10 +375,13 @@ class StepRunner:
 
     # --- Waiting -----------------------------------------------------------------------------------------------------
 
-    async def _until(self, time_ns: int) -> None:
-        """Wait until that time of the run's clock; of the wall's, where that stands still."""
+    async def _until(self, time_ns: int, *, exact: bool = False) -> None:
+        """Wait until that time of the run's clock; of the wall's, where that stands still. What is sent at a rate has
+        to come at an `exact` time, however busy the machine is: a velocity that holds for longer leads elsewhere."""
         left_s = max(0.0, (time_ns - self._arena.ros_now_ns()) / NS)
-        await self._arena.wait(lambda: self._arena.ros_now_ns() >= time_ns or self.is_over(), left_s)
+        await self._arena.wait(
+            lambda: self._arena.ros_now_ns() >= time_ns or self.is_over(), left_s, exact=exact
+        )
 
     async def _come_up(self) -> None:
         """Wait for processes that may yet become nodes: on a busy machine, a pause would be over before they are up."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import sys
+import time
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
@@ -76,6 +77,22 @@ def test_nodes_that_share_a_topic_are_waited_for(
     session.live = live
     asyncio.run(session.await_connections())
     assert len(asked) == looks
+
+
+@pytest.mark.parametrize("exact", [True, False])
+def test_what_is_sent_at_a_rate_is_not_held_up_where_others_fill_the_machine(exact: bool) -> None:
+    """A wait for a node gets longer by the time that others take, and one for a time does not."""
+
+    async def wait() -> float:
+        session = ArenaSession.__new__(ArenaSession)
+        session.live, session._changed = RunState(), asyncio.Event()
+        session._error, session._failure = None, ""
+        begun_s = time.monotonic()
+        asyncio.get_running_loop().call_soon(lambda: setattr(session.live, "lost_s", 0.3))
+        assert not await session.wait(lambda: False, 0.02, exact=exact)
+        return time.monotonic() - begun_s
+
+    assert (asyncio.run(wait()) < 0.3) == exact
 
 
 HERE = sys.version_info[:2]

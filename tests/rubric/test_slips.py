@@ -109,9 +109,7 @@ def test_what_may_be_a_slip_is_a_warning(examples: Path, slip: dict[str, str]) -
 )
 def test_a_text_is_no_pattern(examples: Path, name: str, text: str, new: str, why: str) -> None:
     path = _spoiled(examples, name, f"text: {text}", f"text: {new}")
-    assert f"with.text: is compared letter by letter: {why}" in "".join(
-        warnings_of(load_rubric(str(path)), "")
-    )
+    assert f"text: is compared letter by letter: {why}" in "".join(warnings_of(load_rubric(str(path)), ""))
 
 
 def test_calls_of_one_service_have_one_type(examples: Path) -> None:
