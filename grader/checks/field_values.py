@@ -381,6 +381,8 @@ def _other_value(
     where = f"in the {params.when} message that" if params.when in {"first", "last"} else "when"
     hint = f"{params.field} has to be {params.words} {where} you publish"
     hint = one_for_another(first.values, params.value) or hint
+    if params.of != "student":
+        hint = f"look at what your node publishes: what comes on {params.topic} comes of it"
     own = sent_by(run, params.topic, params.of)
     beside = "" if other else set_beside(own, first.time_ns, params.field, params.value, params.tolerance)
     if beside:

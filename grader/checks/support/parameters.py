@@ -16,7 +16,7 @@ from grader.checks.registry import Check
 from grader.checks.support.console_output import Line
 from grader.checks.support.exit_causes import Ending, explain_end, explain_error
 from grader.checks.support.fields import value_text
-from grader.checks.support.processes import base_name, early_end
+from grader.checks.support.processes import base_name, early_end, lives
 from grader.checks.support.text import get_param, init, near_names, python_or_cpp, shown
 from grader.checks.support.topics import cite, files_that_run, nodes_on, published_topics
 from grader.evidence.events import ParamEvent
@@ -267,7 +267,28 @@ def _not_private(run: Run, verdict: Verdict) -> Verdict:
             why = f"{node} is given {own}, and asks for {name}"
             hint = f"read it with {get_param(f'~{last}')}{_asked_before(run, name, f'~{last}')}"
             return verdict.explained(why, hint, cause=own)
+    for node, own, word in _given_as_arguments(run):
+        # To read a map is to read what is in it.
+        asked = [f"{name}/" for actor, name, _ in reads if actor == node]
+        if (
+            asked
+            and own in there
+            and node in _publishing(verdict, run)
+            and not any(map(f"{own}/".startswith, asked))
+        ):
+            last = own.rpartition("/")[2]
+            why = f"the run gives {node} `{shown(word)}`, and it reads no parameter of that name"
+            return verdict.explained(why, f"read it with {get_param(f'~{last}')}", cause=own)
     return verdict
+
+
+def _given_as_arguments(run: Run) -> Iterator[tuple[str, str, str]]:
+    """Yield the private parameters that the run gives scripts as arguments: the node, the name and the argument."""
+    words = [word for life in lives(run) for word in life.start.argv[1:]]
+    named = [(word, match[1]) for word in words if (match := re.match(r"_([A-Za-z]\w*):=", word))]
+    yield from (
+        (node, f"{node}/{name}", word) for node in sorted(run.student_nodes()) for word, name in named
+    )
 
 
 def _is_misread(package: PackageFacts, run: Run, verdict: Verdict) -> bool:
