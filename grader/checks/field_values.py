@@ -379,10 +379,7 @@ def _other_value(
     why = next(map(str, differences(other, params.value, params.tolerance)), "")
     seen = f"it is {shown(why)}" if first.values else f"it is not there ({first.fault})"
     where = f"in the {params.when} message that" if params.when in {"first", "last"} else "when"
-    hint = f"{params.field} has to be {params.words} {where} you publish"
-    hint = one_for_another(first.values, params.value) or hint
-    if params.of != "student":
-        hint = f"look at what your node publishes: what comes on {params.topic} comes of it"
+    hint = one_for_another(first.values, params.value) or _to_be_set(params, where)
     own = sent_by(run, params.topic, params.of)
     beside = "" if other else set_beside(own, first.time_ns, params.field, params.value, params.tolerance)
     if beside:
@@ -417,6 +414,12 @@ def _other_value(
     if since := turned_wrong(found, params.value):  # a callback that fails later did not do it
         verdict = verdict.based_on(wrong="order" if MOVED in why else "place", due=((run.start_ns, since),))
     return verdict.if_repeated()
+
+
+def _to_be_set(params: FieldEqualsParams, where: str) -> str:
+    if params.of != "student":
+        return f"look at what your node publishes: what comes on {params.topic} comes of it"
+    return f"{params.field} has to be {params.words} {where} you publish"
 
 
 def _why_first(

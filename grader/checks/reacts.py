@@ -66,6 +66,8 @@ class ReactsParams(Record):
     """What has to come, or with `never` must not come."""
     within_s: Annotated[float, Field(ge=0)] = 0.0
     """How soon after the cause the effect has to come. Required with a `cause`."""
+    least_s: Annotated[float, Field(ge=0)] = 0.0
+    """How long after the cause the effect may come at the earliest, where the lab asks for a pause."""
     never: bool = False
     """The other way around: whether no effect may come, from `within_s` after the cause begins and for as long as it is
     true. Without a `field`, it is true from its first message until the run ends."""
@@ -82,6 +84,10 @@ class ReactsParams(Record):
             raise ValueError("give a cause, or never: true for a run in which no effect may come")
         if (self.cause is None) == bool(self.within_s):
             raise ValueError("give cause and within_s together")
+        if self.least_s and (self.never or self.least_s >= self.within_s):
+            raise ValueError(
+                "least_s is less than within_s, and not for never: silence begins after within_s"
+            )
         return self
 
     @property
@@ -138,6 +144,7 @@ def reacts(package: PackageFacts, run: Run, params: ReactsParams) -> Verdict:
         or _never_caused(causes, run, params)
         or _turned_round(answers, causes, effects, params)
         or _judge_unanswered(answers, run, params, instead)
+        or _too_soon(answers, run, params)
         or passed(f"{plural(len(answers), 'time')}, {params.effect.words} follows {params.trigger.words}")
     )
     if verdict.status is Status.FAIL:
@@ -145,8 +152,10 @@ def reacts(package: PackageFacts, run: Run, params: ReactsParams) -> Verdict:
     times = [one.after_s for one in answers if one.after_s is not None]
     answered = f"{len(times)} of {plural(len(answers), 'answer')}"
     span = (answers[0].at_ns, answers[-1].at_ns) if answers else (None, None)
+    least = f"{significant(params.least_s)} s at least and " if params.least_s else ""
+    most = f"{least}{significant(params.within_s)} s at most after {params.trigger.words}"
     return verdict.about(
-        expected=f"{params.effect.words}, {significant(params.within_s)} s at most after {params.trigger.words}",
+        expected=f"{params.effect.words}, {most}",
         measured=verdict.measured or answered + (f", up to {max(times):.2f} s after" if times else ""),
         citations=(cite(run, _shown_on(run, params), *span), cite(run, params.effect.topic)),
     )
@@ -519,6 +528,28 @@ def _other_answer(
     also = f", and {beside} is {value_text(wanted)}" if beside else ""
     fix = f"set {field} to {value_text(wanted)}, not {beside}" if beside else fix
     return f"{field} is {value_text(came.values[0])} then{also}", fix, field or ""
+
+
+def _too_soon(answers: Sequence[Answer], run: Run, params: ReactsParams) -> Verdict | None:
+    """Return the verdict where an effect comes before it may."""
+    soon = [
+        one
+        for one in answers
+        if one.after_s is not None and one.after_s < params.least_s - ORDER_S * run.warp
+    ]
+    if not soon:
+        return None
+    after_s = min(one.after_s or 0.0 for one in soon)
+    often = f"{len(soon)} of {plural(len(answers), 'time')}, " if len(answers) > 1 else ""
+    comes = f"{often}{params.effect.words} comes {after_s:.2f} s after {params.trigger.words}"
+    least = f"{significant(params.least_s)} s"
+    hint = f"keep the time of the message, and see in the loop or a timer whether {least} have passed since"
+    verdict = failed(f"{comes}, sooner than {least}", hint=hint).if_repeated()
+    return (
+        excused(verdict, run, soon[0].at_ns, run.end_ns, why_late)
+        if after_s > params.least_s / 2
+        else verdict
+    )
 
 
 def _judge_unanswered(
