@@ -91,6 +91,13 @@ class ReactsParams(Record):
         return self
 
     @property
+    def expected(self) -> str:
+        """What is expected, in words: of an answer, with when it has to come."""
+        least = f"{significant(self.least_s)} s at least and " if self.least_s else ""
+        most = f"{least}{significant(self.within_s)} s at most after {self.trigger.words}"
+        return f"{self.effect.words}, {most}"
+
+    @property
     def trigger(self) -> Condition:
         """The cause, where there is one."""
         assert self.cause is not None  # noqa: S101 - it is missing only where no effect may come in the whole run
@@ -147,28 +154,29 @@ def reacts(package: PackageFacts, run: Run, params: ReactsParams) -> Verdict:
         or _too_soon(answers, run, params)
         or passed(f"{plural(len(answers), 'time')}, {params.effect.words} follows {params.trigger.words}")
     )
-    if verdict.status is Status.FAIL:
-        verdict = _with_ranges(package, run, params, causes, verdict)
-    times = [one.after_s for one in answers if one.after_s is not None]
-    answered = f"{len(times)} of {plural(len(answers), 'answer')}"
+    verdict = _with_ranges(package, run, params, causes, verdict)
     span = (answers[0].at_ns, answers[-1].at_ns) if answers else (None, None)
-    least = f"{significant(params.least_s)} s at least and " if params.least_s else ""
-    most = f"{least}{significant(params.within_s)} s at most after {params.trigger.words}"
     return verdict.about(
-        expected=f"{params.effect.words}, {most}",
-        measured=verdict.measured or answered + (f", up to {max(times):.2f} s after" if times else ""),
+        expected=params.expected,
+        measured=verdict.measured or _measured(answers),
         citations=(cite(run, _shown_on(run, params), *span), cite(run, params.effect.topic)),
     )
+
+
+def _measured(answers: list[Answer]) -> str:
+    times = [one.after_s for one in answers if one.after_s is not None]
+    answered = f"{len(times)} of {plural(len(answers), 'answer')}"
+    return answered + (f", up to {max(times):.2f} s after" if times else "")
 
 
 def _with_ranges(
     package: PackageFacts, run: Run, params: ReactsParams, causes: Sequence[Reading], verdict: Verdict
 ) -> Verdict:
-    """Return the loss with what the script reads of a scan, where the range that is the cause is elsewhere."""
+    """Return the verdict; a loss with what the script reads of a scan, where the range that causes it is elsewhere."""
     scans = [c for c in run.channels if c.topic == params.trigger.topic and c.type == SCAN]
     reads = run_slips(package, run, "ranges-read") if scans else []
     began = next((one for one in causes if params.trigger.holds(one)), None)
-    if not reads or began is None:
+    if not reads or began is None or verdict.status is not Status.FAIL:
         return verdict
     scan = next(
         (one for c in scans for t, one in zip(c.times_ns, c.values, strict=True) if t == began.time_ns), None
@@ -349,7 +357,7 @@ def _judge_silence(package: PackageFacts, run: Run, params: ReactsParams) -> Ver
         or _silent_without_reason(package, run, causes, spans, params)
         or _kept_silent(own, params)
     )
-    if verdict.status is Status.FAIL and params.cause:
+    if params.cause:
         verdict = _with_ranges(package, run, params, causes, verdict)
     expected = f"{params.effect.absence} {_silent_words(params)}"
     cited = (cite(run, params.effect.topic if effects else "/grader/graph"),)

@@ -61,11 +61,9 @@ SLIPS = {
      "remove `raw_input(…)`, and put its value in the code: a node cannot ask for input"),
     **{f"name '{old}' is not defined": (f"`{old}` is Python 2", f"write `{new}`, as in Python 3")
        for old, new in {"xrange": "range", "unicode": "str", "basestring": "str", "long": "int", "unichr": "chr",
-                        "reduce": "functools.reduce", "reload": "importlib.reload",
-                        "file": "open"}.items()},
-    "'dict' object has no attribute 'has_key'": ("`has_key` is Python 2", "write `key in d` for `d.has_key(key)`"),
-    **{f"'dict' object has no attribute 'iter{new}'": (f"`iter{new}` is Python 2", f"write `{new}`, as in Python 3")
-       for new in ("items", "values", "keys")},
+                        "reduce": "functools.reduce", "reload": "importlib.reload", "file": "open"}.items()},
+    **{f"'dict' object has no attribute '{old}'": (f"`{old}` is Python 2", f"write `{new}`, as in Python 3")
+       for old, new in {"has_key": "key in …", **{f"iter{n}": n for n in ("items", "values", "keys")}}.items()},
     **{f"name '{old}' is not defined": (f"Python has no `{old}`", f"write `{new}` instead of `{old}`")
        for old, new in {"true": "True", "false": "False", "TRUE": "True", "FALSE": "False", "null": "None",
                         "NULL": "None", "nullptr": "None", "nil": "None", "none": "None", "this": "self",
