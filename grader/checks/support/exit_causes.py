@@ -431,15 +431,13 @@ def _by_other_lines(found: Traceback, place: FileCitation, package: PackageFacts
     if slip := next((name for said, name in OF_OTHER_LINES.items() if said in found.message), ""):
         return next(((s.message, s.fix) for s in own if slip in {s.kind, s.name}), None)
     late = found.kind in {"ROSInitException", "ROSException"} and "init_node" in found.message
-    # of a function that a line outside of it calls too early, that line
-    outermost = next((f.line for f in found.own_frames if path_in_package(package, f.file) == place.file), 0)
-    place = place.model_copy(update={"line": outermost or place.line}) if late else place
-    return _late_init(place, package) if late else explain_narrow_handler(found, place, package)
+    calls = [f.line for f in found.own_frames if path_in_package(package, f.file) == place.file] or [1]
+    return _late_init(place.file, calls, package) if late else explain_narrow_handler(found, place, package)
 
 
-def _late_init(place: FileCitation, package: PackageFacts) -> tuple[str, str] | None:
-    """Return why `init_node` was not called before: it stands below that line, or in an `__init__` that is none."""
-    slips = [s for s in package.slips if s.file == place.file]
+def _late_init(file: str, lines: Sequence[int], package: PackageFacts) -> tuple[str, str] | None:
+    """Return why `init_node` was not called before these lines, the first of which calls what the others are in."""
+    slips = [s for s in package.slips if s.file == file]
     if astray := next((s for s in slips if (s.kind, s.name) == ("object", "__init__")), None):
         return astray.message, astray.fix
     gone = next((s for s in slips if (s.kind, s.name) == ("commented-out", "init_node")), None)
@@ -447,11 +445,12 @@ def _late_init(place: FileCitation, package: PackageFacts) -> tuple[str, str] | 
         told = in_comments(slips) or {"message": f"line {gone.line} is commented out", "fix": gone.fix}
         return told["message"], told["fix"]
     if never := next((s for s in slips if s.kind == "no-init"), None):
-        return never.message, f"call `rospy.init_node(…)`, with the node's name, above line {place.line}"
+        return never.message, f"call `rospy.init_node(…)`, with the node's name, above line {lines[0]}"
     calls = [s.line for s in slips if s.kind == "node-name" and not s.fix]
-    below = [line for line in calls if place.line and line > place.line]
-    move = f"move `rospy.init_node(…)` from line {below[0]} up, above line {place.line}" if below else ""
-    return (CAUSES["ROSInitException"][0], move) if move else None
+    # of a function that a line outside of it calls too early, that line
+    below = [(call, line) for line in lines for call in calls if call > line]
+    move = "move `rospy.init_node(…)` from line {} up, above line {}"
+    return (CAUSES["ROSInitException"][0], move.format(*below[0])) if below else None
 
 
 def _asks_for_input(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 import posixpath
 import re
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Mapping
 from contextlib import suppress
 from pathlib import PurePosixPath
 from typing import NamedTuple
@@ -464,12 +464,23 @@ def _other_attributes(package: PackageFacts, owner: str, wrong: str, source: str
     # what is set is no method of a text
     if len(known) == 1 and of_value and not re.search(rf"\.{wrong}\s*[-+*/]?=(?!=)", source):
         return f"it is the whole message ({owner})", f"write `.{known[0]}.{wrong}` instead of `.{wrong}`"
-    why, fix = _other_field(owner, known, wrong, source)
+    why, fix = _other_field(owner, known, wrong, source, _types_in(package, owner))
     of_own = [f", or add it to {one.path}" for one in package.interfaces if owner in one.classes]
     return why, fix + "".join(of_own if "that you mean" in fix else ())
 
 
-def _other_field(owner: str, known: tuple[str, ...], wrong: str, source: str) -> tuple[str, str]:
+def _types_in(package: PackageFacts, owner: str) -> dict[str, str]:
+    """Return the types of the fields of a message of the package's own, by name; nothing where all have the same."""
+    fields = [
+        f for one in package.interfaces if one.classes == (owner,) for f in one.fields if f.value is None
+    ]
+    types = {field.name: field.type for field in fields}
+    return types if len({*types.values()}) > 1 else {}
+
+
+def _other_field(
+    owner: str, known: tuple[str, ...], wrong: str, source: str, kinds: Mapping[str, str]
+) -> tuple[str, str]:
     """Return what a message has in place of a field that it has not, and that is like none of its own."""
     inner = re.search(rf"\.{wrong}\.({'|'.join(known)})\b", source)
     if inner:  # `feedback.feedback.count`: this is the inner part already
@@ -484,7 +495,8 @@ def _other_field(owner: str, known: tuple[str, ...], wrong: str, source: str) ->
     ]
     if len(way) == 1:
         return f"{wrong} is in its {way[0]}", _line_with(source, wrong, f"{way[0]}.{wrong}")
-    listed = join_words(known[:ATTRIBUTES_SHOWN]) + (", …" if len(known) > ATTRIBUTES_SHOWN else "")
+    names = [f"{name} ({kinds[name]})" if name in kinds else name for name in known[:ATTRIBUTES_SHOWN]]
+    listed = join_words(names) + (", …" if len(known) > ATTRIBUTES_SHOWN else "")
     return f"{owner} has {listed}", f"write the field that you mean instead of {wrong}"
 
 
