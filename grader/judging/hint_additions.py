@@ -55,6 +55,7 @@ from grader.wording import NOTHING_TO_DO, join_words, on_lines, significant
 POINTS_MAX = 10
 """So many faults are told at one criterion, and the others counted."""
 _NO_FIELD = re.compile(r"has no attribute '(?P<field>\w+)'.*? \((?P<file>[\w./-]+), line (?P<line>\d+)\)")
+_WHOLE = re.compile(r"\((?P<file>[\w./-]+), line (?P<line>\d+)\): \S+ is no whole number")
 _NO_MODULE = re.compile(
     r"(?:No module named|cannot import name '\w+' from) '(?P<module>\w+)[\w.]*'.*? "
     r"\((?P<file>[\w./-]+), line (?P<line>\d+)\)"
@@ -441,8 +442,22 @@ def name_connections(verdict: Verdict, facts: Facts) -> Verdict:
     return verdict.model_copy(update={"hint": _with_next(verdict, told)})
 
 
+def _name_other_arguments(verdict: Verdict, facts: Facts) -> Verdict:
+    """Return the verdict; where an argument with decimals is made a whole number, its hint has the lines of the other
+    arguments too."""
+    found, build = _WHOLE.search(verdict.message), facts.runs.get(PACKAGE_RUN)
+    if found is None or build is None or "`float(" not in verdict.hint:
+        return verdict
+    lines = [line.partition("#")[0] for line in build.file_lines(found["file"])[:LINES_READ]]
+    numbers = [n for n, line in enumerate(lines, 1) if re.search(r"\bint\(\s*sys\.argv\[", line[:LINE_CHARS])]
+    if len(numbers) == 1 or int(found["line"]) not in numbers:
+        return verdict
+    return verdict.model_copy(update={"hint": f"{verdict.hint} on {on_lines(numbers)}"})
+
+
 def name_other_lines(verdict: Verdict, facts: Facts) -> Verdict:
     """Return the verdict; where a field is not there that a line reads or sets, its hint has the other lines too."""
+    verdict = _name_other_arguments(verdict, facts)
     found, build = _NO_FIELD.search(verdict.message), facts.runs.get(PACKAGE_RUN)
     if found is None or build is None or not verdict.hint.startswith("write "):
         return verdict

@@ -22,6 +22,7 @@ from grader.judging.hint_additions import (
     keep_other_names,
     name_connections,
     name_other_imports,
+    name_other_lines,
     name_other_parameters,
     name_rospy,
     name_same_file,
@@ -510,6 +511,26 @@ def test_parameters_are_not_named_that_a_launch_file_may_set_or_an_argument_sets
     message = f"ended before (KeyError: '/hz' ({SCRIPT['path']}, line 2): the parameter '/hz' is not set)"
     verdict = failed(message, hint="give it a default: `rospy.get_param('/hz', …)`")
     assert name_other_parameters(verdict, lab.criteria[0], try_facts(lab, runs)) == verdict
+
+
+@pytest.mark.parametrize(
+    ("below", "added"),
+    [
+        ("y = int(sys.argv[2])", " on lines 2 and 3"),
+        ("y = float(sys.argv[2])", ""),
+        ("# y = int(sys.argv[2])\nn = int(count)", ""),
+    ],
+)
+def test_the_other_arguments_that_are_made_whole_are_named(below: str, added: str) -> None:
+    lab = rubric(RATE, scenarios={"talker": SCENARIO})
+    source = f"#!\nx = int(sys.argv[1])\n{below}\n"
+    package = {"package": {"files": [SCRIPT]}, "attachments": {SCRIPT["path"]: source}}
+    facts = try_facts(lab, build_runs({"runs": {"package": package}}))
+    why = f"ValueError: invalid literal for int() with base 10: '2.5' ({SCRIPT['path']}, line 2)"
+    verdict = failed(
+        f"it ended: {why}: '2.5' is no whole number", hint="write `float(…)` in place of `int(…)`"
+    )
+    assert name_other_lines(verdict, facts).hint == f"{verdict.hint}{added}"
 
 
 @pytest.mark.parametrize(
