@@ -16,6 +16,7 @@ from grader.checks.support.exit_causes import explain_early_end, explain_error
 from grader.checks.support.fields import FieldPath, NoField, values_at
 from grader.checks.support.processes import OnTopic, observed_until_ns, slips_of
 from grader.checks.support.recorder_losses import losses, whole_until_ns
+from grader.checks.support.services import answers_between
 from grader.checks.support.text import COUNT, NUMBER, loop_rate, message_pattern
 from grader.evidence.run import Channel, Run, once_for_each_run
 from grader.model.package import PackageFacts
@@ -169,7 +170,9 @@ def wrong_steps(count: Count, run: Run, *, maximum: int, rate_hz: float) -> Wron
     # A counter that stands still, goes back or goes by two is wrong at any rate: no queue makes it so.
     if wrong and skips == wrong and usual in {None, 1} and count.is_flood(run, rate_hz):
         return Wrong(wrong, flood=True, excused=usual == 1)
-    lost = tuple(s for s in skips if count.was_lost_in_transit(s, s.change))
+    # Where a service switches the node off, the gap is the node's own.
+    own = (s for s in skips if not answers_between(run, s.from_ns, s.to_ns))
+    lost = tuple(s for s in own if count.was_lost_in_transit(s, s.change))
     numbers = {s.number for s in lost}
     return Wrong(wrong, own=tuple(s for s in wrong if s.number not in numbers), lost=lost)
 

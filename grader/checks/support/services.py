@@ -46,6 +46,11 @@ class Exchange(NamedTuple):
     detail: str
 
 
+def answers_between(run: Run, from_ns: int, to_ns: int) -> bool:
+    """Return whether a node answered a call of the grader's between two times: it was there, and the machine too."""
+    return any(e.action == "answer" and e.value is not None and from_ns < t < to_ns for t, e in run.actors)
+
+
 def offers(run: Run) -> dict[str, Offer]:
     """Return the services of the student's nodes by name, as they were last; every node's loggers left out."""
     found: dict[str, Offer] = {}
