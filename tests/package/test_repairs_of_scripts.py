@@ -297,6 +297,10 @@ CASES = {
         ["missing-call"], "`heard(…)` gives a value to a variable front of its own",
         after={TALKER: "def heard(msg):\n    global front\n    front = msg.data\n"},
     ),
+    "variable-that-a-callback-shows": Case(
+        swapped(TALKER, ("\ndef main():", "\nup = 1\n\ndef heard(msg):\n    up = msg.data\n    print(up)\n\ndef main():"),
+                        ("        rate.s", "        print(up)\n        rate.s")),
+        ["missing-call"], "a value to a variable up of its own"),
     "variables-of-a-callback": Case(
         swapped(TALKER, ("\ndef main():", f"\ny = x = n = 0\n\n{HEARD}\ndef main():"),
                         ("        rate.s", "        print(x, y)\n        rate.s")),

@@ -39,10 +39,11 @@ def with_globals(text: str) -> Iterator[Step]:
 
 def _unbound_variables(tree: ast.Module) -> Iterator[Unbound]:
     """Yield functions with variables of the whole file to which they give a value without a `global`, and which they
-    have read before, or never read while others do."""
-    assigned = (one for one in tree.body if isinstance(one, ast.Assign | ast.AnnAssign))
-    targets = (t for one in assigned for t in getattr(one, "targets", None) or [getattr(one, "target", None)])
-    shared = {target.id for target in targets if isinstance(target, ast.Name)}
+    have read before, or which others read: then they never read it themselves, or nothing else changes it."""
+    assigned = [one for one in tree.body if isinstance(one, ast.Assign | ast.AnnAssign)]
+    shared = {name for one in assigned for name in _targets(one)}
+    plain = {name for one in assigned if isinstance(one.value, ast.Constant) for name in _targets(one)}
+    states = plain - {name for n in nodes_in(tree) if isinstance(n, ast.Global) for name in n.names}
     for function in (n for n in nodes_in(tree) if isinstance(n, ast.FunctionDef)):
         inner = (n for n in nodes_in(function)[1:] if isinstance(n, ast.FunctionDef | ast.Lambda))
         nodes = set(nodes_in(function)) - {n for one in inner for n in nodes_in(one)}
@@ -52,11 +53,16 @@ def _unbound_variables(tree: ast.Module) -> Iterator[Unbound]:
         uses = {name: sorted(_reads_and_writes(nodes, name)) for name in shared - own}
         read_first = {n for n, all_ in uses.items() if all_ and not all_[0][1] and any(w for _, w in all_)}
         given = [n for n, all_ in uses.items() if all_ and all_[0][1] and _is_read_outside(tree, n, function)]
-        kept = {name for name in given if all(at[1] == 1 for at, _ in uses[name])}
+        kept = {name for name in given if name in states or all(at[1] == 1 for at, _ in uses[name])}
         if first is not None and first.lineno > function.lineno and read_first | kept:
             # beside one that is meant to be the file's, another that the function reads itself is meant to be, too
             names = sorted(read_first.union(given), key=lambda name: (uses[name][0], name))
             yield Unbound(function, names, first, "unbound" if read_first else "kept")
+
+
+def _targets(one: ast.Assign | ast.AnnAssign) -> list[str]:
+    targets = one.targets if isinstance(one, ast.Assign) else [one.target]
+    return [target.id for target in targets if isinstance(target, ast.Name)]
 
 
 def _is_read_outside(tree: ast.Module, name: str, function: ast.FunctionDef) -> bool:
