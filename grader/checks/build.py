@@ -309,7 +309,7 @@ def _further_hints(lines: Sequence[str], package: PackageFacts, first: BuildErro
 
 
 _OF_NAMES = re.compile(r"not (?:been )?declared|not name a |has no member|not a member")
-_SURE = re.compile(r"write (?:\w+::\w+$|\S+ in place of |the \w+'s variable )")
+_SURE = re.compile(r"^write (?:\w+::\w+$|\S+ in place of |the \w+'s variable )")
 FURTHER_MAX = 4
 
 
