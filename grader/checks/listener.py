@@ -261,7 +261,9 @@ def _never_subscribed(package: PackageFacts, run: Run, topic: str, subscribed: S
     spare = run_slip(package, run, "callback-missing")
     callback = (spare.name if spare else "") or "callback"
     call = subscriber(topic, f"{TYPE_SLOT}, {callback}")
-    meant = near or (subscribed if len(subscribed) == 1 else [])
+    # A topic on which the grader sends is meant to be there, so it is none to rename or to swap.
+    spares = [one for one in subscribed if not probes_on(run, one)]
+    meant = near or (subscribed if len(subscribed) == 1 else spares if len(spares) == 1 else ())
     end: SlipKind = "subscriber" if subscribed else "publisher"
     name = next(iter(meant), "" if subscribed else topic)
     cited = named_at(package, run, end, name) if name else ()
@@ -271,15 +273,14 @@ def _never_subscribed(package: PackageFacts, run: Run, topic: str, subscribed: S
         other = f", but publishes on {topic}, as a talker does"
         above = "" if spare and spare.name else f" with `def {callback}(msg):` above it,"
         hint = f"write {call} in place of the publisher,{above} and `rospy.spin()` in place of the loop"
-    # A topic on which the grader sends is meant to be there, so it is not one to swap.
-    elif len(subscribed) == 1 and publishes and not near and not probes_on(run, subscribed[0]):
+    elif len(subscribed) == len(spares) == 1 and publishes and not near:
         other = f"{other}, and publishes on {topic}"
         hint = f"swap {topic} and {subscribed[0]}: it should subscribe to {topic}, and not publish on it"
     elif copied := copied_topic(package, run, "subscriber"):
         other = f"{other}, on {copied}"
         hint = f"write {topic} on the one of {copied} whose callback is for it"
-    elif len(subscribed) == 1 and not near and not probes_on(run, subscribed[0]):
-        hint += rename_if_meant(subscribed)
+    elif len(spares) == 1 and not near:
+        hint += rename_if_meant(spares)
     verdict = failed(f"the node never subscribes to {topic}{other}", hint=hint, citations=cited)
     return verdict.about(said=" ".join(meant))
 

@@ -462,7 +462,8 @@ class Later:
             yield Fix(f"write %s instead of {place[0]} on {_line(right[0])}")
         unheard = not self._ran or not (isinstance(self._run, Run) and probes_on(self._run, self._topic))
         if not unheard or template == VALUE:
-            yield from self._unprinted(heard) if unheard and len(heard) <= 1 else ()
+            # of several topics, those of this name: another may be a slip of it
+            yield from self._unprinted(heard if len(heard) <= 1 else ()) if unheard else ()
             return
         if right and len(heard) == 1 and self._has_no_field(right[0]) and ".data`" not in self._verdict.hint:
             yield Fix(f"print the `data` of the message on {_line(right[0])}")

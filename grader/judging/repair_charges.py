@@ -43,8 +43,8 @@ SEEN_IN_RUNS = {"missing-import", "missing-call", "topic-name", "service-name", 
 """These are lost in runs, so no criterion of the files asks for them."""
 DONE_BEFORE_RUNS = {"executable-bit", "line-ends", "shebang", "byte-order-mark", "encoding"}
 """The arena repairs these in the scripts that the rubric starts, so no run of those is lost by them."""
-OF_SYNTAX = {"python-syntax", "launch-syntax", "yaml-syntax"}
-"""Of a line that could not be read, the copy shows for the first time what it says."""
+OF_LINES = {"python-syntax", "launch-syntax", "yaml-syntax", "missing-call", "missing-import"}
+"""Of a line that could not be read or did nothing, the copy shows for the first time what it does."""
 MADE_BY_BUILDS = {".msg", ".srv", ".action", ".c", ".cc", ".cpp", ".cxx"}
 _PLACE = re.compile(r"^line \d+ of [^:]+: ")
 TAG = re.compile(r"<(\w+)>[^<>]*</\1>")
@@ -90,7 +90,7 @@ def charge_repairs(
         if own and better.isdisjoint(own):
             continue  # the criterion of the name says by itself what is wrong with it
         failed_by_it = [c for c in criteria_of_runs if c.id not in better and fails_in(first[c.id], repair)]
-        if repair.kind in OF_SYNTAX and failed_by_it:
+        if repair.kind in OF_LINES and failed_by_it:
             continue  # that the copy shows nothing of that criterion is no reason to charge another
         possible = _possible([c for c in criteria if repair in needs[c.id]], first, repair)
         named = any(repair.kind in NAMES and _names(c, repair) for c in possible)
@@ -431,11 +431,11 @@ def _names_new(repair: Repair, hint: str) -> bool:
 
 
 def lines_read_now(repairs: Iterable[Repair]) -> set[tuple[str, int]]:
-    """Return the lines that could not be read before these repairs."""
+    """Return the lines that could not be read, or did nothing, before these repairs."""
     return {
         (repair.file, repair.line + further)
         for repair in repairs
-        if repair.kind in OF_SYNTAX and repair.line is not None
+        if repair.kind in OF_LINES and repair.line is not None
         for further in range(len(repair.before.split("\n")))
     }
 

@@ -252,6 +252,9 @@ CALLED = "if __name__ == '__main__':\n    main()\n"
         (node("    p.publish(1)\n" + LOOP + "        work()\n        rate.sleep()\n") + CALLED, []),
         (node("    p.publish(1)\n" + LOOP + "        rate.sleep()\n    p.publish(2)\n") + CALLED,
          [("never-reached", 5, "the publish(…) on line 7")]),
+        ("def one():\n    while not rospy.is_shutdown():\n        p.publish(1)\n"
+         "def two():\n    while not rospy.is_shutdown():\n        q.publish(2)\none()\ntwo()\n",
+         [("never-reached", 2, "the two(…) on line 8 is never reached: one loop has to do both")]),
         (node("    for i in range(9):\n        p.publish(1)\n") + CALLED,
          [("loop-left", 4, "write `while not rospy.is_shutdown():` on line 4")]),
         *((f"def f(m):\n    for i in range(4):\n        pub.publish(1)\n{given}\nrospy.spin()\n", [])

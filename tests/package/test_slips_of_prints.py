@@ -30,6 +30,7 @@ def said(text: str, tmp_path: Path, callback: str = "cb") -> list[tuple[str, str
         ("    global n\n    n += 1\n    print('heard', n)", "line 4 prints `n`", "on line 4, print `m.data`"),
         ("    print(rospy.get_caller_id() + ' I heard')", "line 2 prints has nothing of the message", "`m.data`"),
         ("    rospy.logdebug('%d', m.data)", "`logdebug` on line 2 shows nothing", "write `rospy.loginfo`"),
+        ("    return\n    print(m.data)", "line 2 ends the callback before line 3 prints the message", "delete line 2"),
         ("    global n\n    n = m.data\n    rospy.logdebug(n)", "`logdebug` on line 4 shows nothing", "on line 4"),
     ],
 )  # fmt: skip

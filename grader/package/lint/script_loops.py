@@ -51,7 +51,7 @@ def never_reached(tree):
     same block, in a function or class of this file too; so is a `spin()`, in what a statement calls as well.
     """
     parts = all_of(tree, ast.FunctionDef, ast.ClassDef)
-    own = {n.name for n in parts if calls_in(n, *MAKES)}
+    own = {n.name for n in parts if calls_in(n, *MAKES) or publishes_on(n)}
     functions, classes = functions_in(tree), {n.name: n for n in all_of(tree, ast.ClassDef)}
     made = {dotted(n.targets[0]): n.value for n in all_of(tree, ast.Assign)} if classes else {}
 
@@ -82,7 +82,7 @@ def never_reached(tree):
             yield from read_late(block[index + 1 :], loop)
             rest = [n for later in block[index + 1 :] for n in ast.walk(later)]
             behind = [n for n in rest if word(n) and word(n) not in within]
-            if behind and ("publish" not in within or word(behind[0]) in own):
+            if behind and ("publish" not in within or word(behind[0]) in own.union(MAKES)):
                 message = "the %s on line %d never ends, so the %s(…) on line %d is never reached"
                 what = "loop" if isinstance(loop, ast.While) else "spin()"
                 message %= (what, loop.lineno, word(behind[0]), behind[0].lineno)
@@ -91,6 +91,12 @@ def never_reached(tree):
                 fix = unreached_fix(one, loop, behind[0], later, called)
                 yield slip(loop.lineno, "never-reached", message, fix)
             break  # nothing behind it in the block runs
+
+
+def publishes_on(part):
+    """Return whether a function stays in a loop that publishes."""
+    loop = holding(part.body) if isinstance(part, ast.FunctionDef) else None
+    return loop is not None and bool(calls_in(loop, "publish"))
 
 
 def read_late(rest, loop):

@@ -223,6 +223,10 @@ class Printing:
             message = "line %d gives what holds the message another value before line %d prints it"
             message %= (self.lost, told[0].lineno)
             return self.lost, "not-printed", message, "delete line %d" % self.lost
+        ends = [one.lineno for one in self.body if isinstance(one, LEAVES)] if told else []
+        if ends and ends[0] < told[0].lineno:
+            message = "line %d ends the callback before line %d prints the message"
+            return ends[0], "not-printed", message % (ends[0], told[0].lineno), "delete line %d" % ends[0]
         if told:
             return self.in_part(told)
         if not self.prints:
