@@ -90,7 +90,7 @@ def message(package: PackageFacts, run: Run, params: MessageParams) -> Verdict:
         # Words first: a time can be read only where it stands in its place.
         _misfit(package, run, heard, params)
         or _wrong_time(package, run, heard, params)
-        or wrong_count(run, heard, params.topic, params.template)
+        or wrong_count(package, run, heard, params.topic, params.template)
         or passed(f"all {count} messages on {params.topic} are '{in_words(params.template)}'{grows}")
     )
     measured = f"{in_one_line(heard[0].data[0])!r} to {in_one_line(heard[0].data[-1])!r} ({plural(count, 'message')})"

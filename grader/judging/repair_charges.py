@@ -255,7 +255,7 @@ def charged_verdict(
     told, beside = _told(repairs, verdict)
     clauses = verdict.hint.split("; ") if told or beside else []
     if any(one not in [*told, *beside] for one in repairs):
-        clauses = [clause for clause in clauses if any(is_told(one, clause) for one in told)]
+        clauses = [c for c in clauses if any(c in one.fix or is_told(one, c) for one in told)]
     hints = clauses + advice_on(one for one in repairs if one not in told)
     hints += _new_names(verdict, repairs, hints)
     said = verdict.message

@@ -9,9 +9,10 @@ import pytest
 
 from grader.judging import judge
 from grader.judging.judge import judge_all_runs
+from grader.judging.repair_charges import charged_verdict
 from grader.model.repair import Repair
 from grader.model.result import CriterionResult
-from grader.model.verdict import FileCitation
+from grader.model.verdict import FileCitation, failed, passed
 from grader.package.launch import parse_launch_files
 from tests.support.rubrics import (
     ALL,
@@ -596,3 +597,19 @@ def test_a_file_that_is_written_as_a_whole_gets_no_hint_on_its_lines() -> None:
     for repairs in ([line], [project], [line, project]):
         (cmake,) = judge(rubric(CMAKE_CHECK), runs | on_copy(copy, *repairs))
         assert re.fullmatch("write these lines in place of all of it: [^;]+", cmake.hint)
+
+
+def test_all_that_one_repair_adds_is_told_beside_another_repair() -> None:
+    waits = "below the add_executable(…) on line {}, write add_dependencies({} ${{${{PROJECT_NAME}}_EXPORTED_TARGETS}})"
+    each = [waits.format(9, "a"), waits.format(10, "b")]
+    lines = [
+        "add_executable(b b.cpp)",
+        *(f"add_dependencies({one} ${{${{PROJECT_NAME}}_EXPORTED_TARGETS}})" for one in "ab"),
+    ]
+    added = Repair(kind="build-line", file="CMakeLists.txt", line=10, before=lines[0], after="\n".join(lines),
+                   message="line 10 of CMakeLists.txt: a and b wait for nothing", fix="; ".join(each))  # fmt: skip
+    removed = Repair(kind="build-line", file="CMakeLists.txt", line=4, before="INCLUDE_DIRS include", after="",
+                     message="no folder include/", fix="remove INCLUDE_DIRS include")  # fmt: skip
+    verdict = failed("no folder include/", hint="; ".join([removed.fix, *each]))
+    told = charged_verdict(verdict, passed("catkin_make succeeded"), [added, removed], ())
+    assert all(one in told.hint for one in [*each, removed.fix])

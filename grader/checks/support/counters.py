@@ -211,7 +211,9 @@ def _usual_fault(usual: float) -> str:
     return f"counts in steps of {significant(usual)}" if usual > 0 else "counts down"
 
 
-def wrong_count(run: Run, channels: Sequence[Channel], topic: str, template: str) -> Verdict | None:
+def wrong_count(
+    package: PackageFacts, run: Run, channels: Sequence[Channel], topic: str, template: str
+) -> Verdict | None:
     """Return the verdict on texts whose `{count}` does not go up by one; None where each one's does, or the template
     has no such place."""
     if COUNT not in template:
@@ -235,7 +237,8 @@ def wrong_count(run: Run, channels: Sequence[Channel], topic: str, template: str
             return failed(message, hint="set the counter once, before the loop, and reset it nowhere")
         steps = wrong_steps(count, run, maximum=NEVER, rate_hz=params.rate_hz)
         if (verdict := judge_steps(count, steps, run, params)) is not None:
-            return verdict
+            stays = count.usual_step() == 0
+            return cite_slip(verdict, count, run, package, "no-effect", "set-in-loop") if stays else verdict
     return None
 
 

@@ -74,8 +74,9 @@ SLIPS = {
     **{f"{said} 'publish'{rest}": ("`publish` belongs to what `rospy.Publisher(…)` returns",
        "write that name in front of it: `pub.publish(…)`")
        for said, rest in (("name", " is not defined"), ("module 'rospy' has no attribute", ""))},
-    "required argument is not an integer": (
-     "a field of whole numbers is given something else, such as a text or 2.0",
+    "list.remove(x): x not in list": ("the list does not have that value",
+     "delete that line, or write `if … in …:` above it, with the value and the list"),
+    "required argument is not an integer": ("a field of whole numbers is given something else, such as a text or 2.0",
      "give it an int: `int(…)` of a text or a number; of a whole message or request, one of its fields"),
     "] already registered": ("the script offers that service already: each turn of a loop makes another one",
      "make it once, above any loop"),

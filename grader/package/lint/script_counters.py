@@ -137,6 +137,7 @@ def counter_slips(tree):
     yield from uncounted(tree)
     yield from counted_elsewhere(tree)
     yield from begun_in_each_turn(tree)
+    yield from given_twice(tree)
     for loop in all_of(tree, *LOOPS):
         body, inside = loop.body, [n for one in loop.body for n in ast.walk(one)]
         sent = [i for i, one in enumerate(body) if calls_in(one, "publish")]
@@ -175,6 +176,17 @@ def begun_in_each_turn(tree):
                 message = "`next(%s)` begins with the first value again each time around the loop" % made
                 fix = "above line %d, write `values = %s`; on line %d, write `next(values)`"
                 yield slip(call.lineno, "set-in-loop", message, fix % (loop.lineno, made, call.lineno), name)
+
+
+def given_twice(tree):
+    """`n = n = 1` in a loop that publishes, where the second `=` is on the key of the `+`."""
+    loops = [one for one in all_of(tree, *LOOPS) if calls_in(one, "publish")]
+    for node in (n for n in all_of(tree, ast.Assign) if len(n.targets) == 2 and signed(n.value) is not None):
+        name, other = map(dotted, node.targets)
+        if name and name == other and loop_around(node, tree) in loops:
+            message = "this sets `%s` to %d" % (name, signed(node.value))
+            fix = "on line %d, write `%s = %s + %d`" % (node.lineno, name, name, signed(node.value))
+            yield slip(node.lineno, "set-in-loop", message, fix, name)
 
 
 def reset_the_wrong_way(ifs, name):
