@@ -105,8 +105,8 @@ class PythonSlip(Placed, Record):
       (`times`), letters of a key (`letters`), a timer's period of 0 (`zero`), a file that each call empties
       (`emptied`), or of a scan an inf that is made 0, the first one alone, an index that is an angle, a
       condition that drives where a wall is near, and ranges that are named after the other side (`inf`,
-      `first`, `angle`, `turned`, `side`), metres that are centimetres (`metres`), or a parent's frame that is
-      given for the child's (`frames`).
+      `first`, `angle`, `turned`, `side`), metres that are centimetres (`metres`), a parent's frame that is
+      given for the child's (`frames`), or a loop that always returns in its first turn (`turn`).
 
     No slips, but what a line says, for checks that compare it with what the lab asks; `message` is a name, a number or
     a text:

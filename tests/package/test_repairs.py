@@ -307,6 +307,8 @@ def test_what_is_added_at_the_end_is_below_the_last_line() -> None:
         ("import winreg, winsound", True, (), True),
         ("from rclpy.node import Node", True, (), True),
         ("from std_msgs.msg import rate", False, (), True),
+        ("from std_srvs import Empty", False, (), True),
+        ("from sensor_msgs import point_cloud2", False, (), False),
         ("from std_msgs.msg import Int8, Int16", False, (), False),
         ("import cv2", True, (), False),
         ("import listener", True, (), False),

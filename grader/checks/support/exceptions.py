@@ -503,7 +503,7 @@ def _unwritable(message: str, _source: str, _marked: tuple[int, int] | None) -> 
     found = _NOT_WRITABLE.search(message)
     if found is None or found[1].startswith("/dev/"):
         return None
-    hint = f"delete this line if the lab does not ask for a file, or {_below_home(found[1])}"
+    hint = f"delete the line that opens it if the lab asks for no file, or {_below_home(found[1])}"
     return "a node may not write to this place", hint
 
 

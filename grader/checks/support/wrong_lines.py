@@ -60,6 +60,7 @@ SEEN_BY = {
     "swallowed": (*OF_ARGUMENTS, "service-answers", "action-result"),
     "shared": ("field-equals", "rostest"),
     "kept": (*OF_STEERING, "field-equals", "field-bounds", "rostest"),
+    "turn": ("prints", "service-answers", "action-result", "field-equals", "reacts", "rostest"),
 }
 """The checks that see what some slips make wrong."""
 

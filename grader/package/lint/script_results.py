@@ -45,6 +45,7 @@ def results(tree):
     yield from filled_fields(tree)
     yield from narrow_handlers(tree)
     yield from unreached_returns(tree)
+    yield from left_in_first_turn(tree)
     meant = misnamed_targets(tree)
     for node, (name, other) in meant.items():
         message = "nothing reads `%s`, to which a value is given here: `%s` is meant" % (name, other)
@@ -186,6 +187,35 @@ def unreached_returns(tree):
                 lines = "line %d" % first if first == last else "lines %d to %d" % (first, last)
                 fix = "indent %s only as far as the `if` on line %d" % (lines, condition.lineno)
                 yield slip(first, "wrong-value", message, fix, "unreached")
+
+
+def left_in_first_turn(tree):
+    """`for` loops that return in their first turn, whatever an `if` in it finds: the others are never looked at."""
+    for loop in all_of(tree, ast.For):
+        ifs = [n for n in loop.body if isinstance(n, ast.If)]
+        returned = [n for one in ifs for n in ast.walk(one) if isinstance(n, ast.Return)]
+        goes_on = any(isinstance(n, (ast.Break, ast.Continue, ast.Yield)) for n in ast.walk(loop))
+        last = final_return(loop.body)
+        if last is None or not returned or goes_on or loop.orelse:
+            continue
+        message = (
+            "the loop on line %d returns in its first turn, so that it never comes to a second one"
+            % loop.lineno
+        )
+        fix = "move line %d below that loop, with the same spaces or tabs before it as line %d has"
+        fix %= (last.lineno, loop.lineno)
+        fix += ", and delete the `else:` above it" if last is not loop.body[-1] else ""
+        yield slip(last.lineno, "wrong-value", message, fix, "turn")
+
+
+def final_return(body):
+    """Return the `return` that a block ends with, in the last `else` of its last `if` too, if its other branches return
+    as well; None where it may go on."""
+    last = body[-1]
+    if isinstance(last, ast.Return):
+        return last
+    branches = isinstance(last, ast.If) and last.orelse and final_return(last.body) is not None
+    return final_return(last.orelse) if branches and len(last.orelse) == 1 else None
 
 
 def is_plain_end(node):

@@ -235,8 +235,11 @@ def _is_misspelt(line: str) -> bool:
 
 
 def _unknown_message(line: str) -> str:
-    """Return what is imported from the messages of a known package, is not there, and is no slip of what is; "" where
-    there is no such name."""
+    """Return what is imported from a known package of messages, or from its messages, is not there, and is no slip of
+    what is; "" where there is no such name."""
+    bare = re.fullmatch(r"from (\w+_(?:msgs|srvs)) import ([A-Z]\w*)", line.strip())
+    if bare is not None and bare[1] in known_packages():  # its classes are in its modules `msg` and `srv`
+        return f"{bare[2]} in {bare[1]}"
     found = re.fullmatch(r"from (\w+)\.msg import ([\w, ]+)", line.strip())
     known = noetic_messages().get(found[1], ()) if found else ()
     if found is None or not known:
