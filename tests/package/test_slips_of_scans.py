@@ -399,6 +399,10 @@ def test_a_loop_that_is_missing_around_a_publish_and_its_pause(tmp_path, below, 
         ("dist = (a - b) ** 2 + (c - d) ** 2\nif dist < near:\n    stop()\n", [1]),
         ("dist = (a - b) ** 2 + (c - d) ** 2\nif dist < least:\n    least = dist\n", []),
         ("distance = a + b\n", []),
+        ("d = abs(math.sqrt((a - b) ** 2) - ((c - d) ** 2))\n", [1]),
+        ("d = sqrt(a ** 2) + c\n", []),
+        ("d = math.sqrt((a - b) * 2 - (c - d) * 2)\n", [1]),
+        ("d = math.sqrt((a - b) * 2 + c)\nd = math.sqrt(a * 2 + b * 2)\n", []),
     ],
 )
 def test_distances_without_a_root(text: str, lines: list[int], tmp_path: Path) -> None:

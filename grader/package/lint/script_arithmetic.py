@@ -10,6 +10,7 @@ from collections import Counter
 from script_names import (
     key_of,
 )
+from script_roots import wrong_roots
 from script_tree import (
     all_of,
     called_name,
@@ -47,7 +48,7 @@ def arithmetic_slips(tree):
     yield from mixed_points(tree)
     yield from mixed_coordinates(tree)
     yield from float_seconds(tree)
-    yield from without_root(tree)
+    yield from wrong_roots(tree)
     yield from unset_fields(tree)
 
 
@@ -514,45 +515,6 @@ def float_seconds(tree):
             message = "`%s` takes a whole number, and `%s()` is a float" % (target, name)
             fix = "on line %d, write `%s = rospy.Time.now()`" % (node.lineno, target.rpartition(".")[0])
             yield slip(node.lineno, "wrong-value", message, fix, "secs")
-
-
-def without_root(tree):
-    """`distance = dx ** 2 + dy ** 2`: a sum of two squares that is called a distance."""
-    named = [(dotted(n.targets[0]), n.value) for n in all_of(tree, ast.Assign)]
-    for function in all_of(tree, ast.FunctionDef):
-        named += [(function.name, n.value) for n in function.body if isinstance(n, ast.Return)]
-    sums = [(name, value) for name, value in named if isinstance(getattr(value, "op", None), ast.Add)]
-    squared = squares_in_use(tree) if sums else ()
-    for name, value in sums:
-        last = name.rpartition(".")[2]
-        is_called_so = "dist" in last.lower() and "sq" not in last.lower() and "2" not in last
-        if is_called_so and is_square(value.left) and is_square(value.right) and last not in squared:
-            message = "`%s` is the square of a distance, as without a square root" % name
-            fix = "on line %d, write `(… + …) ** 0.5`, with brackets around the whole sum" % value.lineno
-            yield slip(value.lineno, "wrong-value", message, fix, "rootless")
-
-
-def squares_in_use(tree):
-    """Return the last names of what a root is taken of elsewhere, or is compared as a square: with a square or a
-    product, or with each other, by `key=` or with the least one so far."""
-    kept = {(dotted(t), dotted(n.value)) for n in all_of(tree, ast.Assign) for t in n.targets}
-    used = [n for n in all_of(tree, ast.Call) if called_name(n) == "sqrt"]
-    powers = [n for n in all_of(tree, ast.BinOp) if isinstance(n.op, ast.Pow)]
-    used += [n for n in powers if getattr(n.right, "value", 0) == 0.5]
-    used += [n for n in all_of(tree, ast.keyword) if n.arg == "key"]
-    for node in all_of(tree, ast.Compare):
-        sides = [node.left, *node.comparators]
-        products = [one for one in sides if isinstance(getattr(one, "op", None), (ast.Pow, ast.Mult))]
-        pair = tuple(map(dotted, sides))
-        used += [node] if products or any(map(is_square, sides)) or kept & {pair, pair[::-1]} else []
-    return {name.rpartition(".")[2] for one in used for name in names_in(one)}
-
-
-def is_square(node):
-    """Whether a value is `x ** 2` or `pow(x, 2)`."""
-    power = node.right if isinstance(getattr(node, "op", None), ast.Pow) else None
-    last = node.args[1] if called_name(node) == "pow" and len(node.args) > 1 else power
-    return getattr(last, "value", None) == 2
 
 
 OF_QUATERNION = 4

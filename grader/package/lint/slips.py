@@ -5,10 +5,10 @@ objects for `script_objects.py`, callbacks for `script_callbacks.py`, what these
 classes for `script_bases.py`, threads and generators for `script_threads.py`, ends of goals for `script_goals.py`,
 loops for `script_loops.py`, their sleeps for `script_sleeps.py`, their rates for `script_rates.py`, values for
 `script_values.py`, arithmetic for `script_arithmetic.py`, scans for `script_scans.py`, sides and frames for
-`script_sides.py`, rows of grids for `script_grids.py`, counters for `script_counters.py`, clocks for
-`script_clocks.py`, what functions return for `script_results.py`, calls that cannot work for `script_calls.py`,
-publishers and messages that nothing uses for `script_unsent.py`. What a script spells in another way,
-`script_rospy.py` and `script_spellings.py` write as finders look for it.
+`script_sides.py`, roots for `script_roots.py`, rows of grids for `script_grids.py`, counters for `script_counters.py`,
+clocks for `script_clocks.py`, what functions return for `script_results.py`, calls that cannot work for
+`script_calls.py`, publishers and messages that nothing uses for `script_unsent.py`. What a script spells in another
+way, `script_rospy.py` and `script_spellings.py` write as finders look for it.
 
 Nothing is executed. A file has to be parsed by ROS's own Python, which is to run it: Python 3.8, standard library only.
 """
