@@ -154,10 +154,12 @@ def _catkin_make(place: ProcessEnvironment, headers: Sequence[str]) -> list[str]
         *catkin_make(place), "--trace-expand", "--trace-format=json-v1",
         *(f"--trace-source={name}" for name in ("CMakeLists.txt", *included)),
         f"--trace-redirect={place.output}/{TRACE}",
+        # what is wrong with one program hides nothing of the others
+        "--make-args", "-k",
     ]  # fmt: skip
     if not headers:
         return whole
-    first = [*whole, "--make-args", "-k", *headers]
+    first = [*whole, *headers]
     return ["/bin/bash", "-c", TWICE, "bash", str(len(first)), *first, *whole]
 
 

@@ -281,7 +281,7 @@ def _broken_build(package: PackageFacts, build: Run, exit_code: int | None) -> V
         f"catkin_make failed: {line}{told.why}" if told else "catkin_make failed without naming an error",
         expected=EXPECTED,
         measured=f"exit code {exit_code}",
-        hint=told.hint + _further_hints(lines, package, error) if told and error else FIRST_ERROR_HINT,
+        hint=_with_further(told.hint, lines, package, error) if told and error else FIRST_ERROR_HINT,
         citations=(place or cite(build, "/grader/console"),),
     )
     if told:
@@ -295,17 +295,20 @@ def _broken_build(package: PackageFacts, build: Run, exit_code: int | None) -> V
     return verdict.based_on(cause=f"{line}{told.why}")
 
 
-def _further_hints(lines: Sequence[str], package: PackageFacts, first: BuildError) -> str:
-    """Return what to write on other lines of the same source, behind a wrong name, where it is sure: what follows from
-    a bracket that is missing, for one, says nothing."""
-    if not _OF_NAMES.search(first.text):
-        return ""
-    found = (
-        (one, explain_error_of_build(one, package, lines).hint)
-        for one in further_errors(lines, package, first)
-    )
-    sure = [f"; on line {one.place.line}, {hint}" for one, hint in found if one.place and _SURE.match(hint)]
-    return "".join(sure[:FURTHER_MAX])
+def _with_further(hint: str, lines: Sequence[str], package: PackageFacts, first: BuildError) -> str:
+    """Return the hint with what to write on other lines of the same source, behind a wrong name, where it is sure: what
+    follows from a bracket that is missing, for one, says nothing. Of other sources, what is wrong first."""
+    told, others = list[str](), dict[str, str]()
+    for one in further_errors(lines, package, first):
+        place, explained = one.place, explain_error_of_build(one, package, lines)
+        if place is None or first.place is None:
+            continue
+        if place.file != first.place.file:
+            others.setdefault(place.file, f"; then {place.file}, line {place.line}: {explained.why}")
+        elif _OF_NAMES.search(first.text) and _SURE.match(explained.hint):
+            told.append(f"; on line {place.line}, {explained.hint}")
+    more, place = "".join([*told, *others.values()][:FURTHER_MAX]), first.place
+    return f"on line {place.line} of {place.file}, {hint}{more}" if more and place else hint
 
 
 _OF_NAMES = re.compile(r"not (?:been )?declared|not name a |has no member|not a member")

@@ -112,15 +112,13 @@ def _of_compiler(match: re.Match[str], package: PackageFacts, required: FileCita
 
 
 def further_errors(lines: Sequence[str], package: PackageFacts, first: BuildError) -> list[BuildError]:
-    """Return what the compiler says of other lines of the same source as the first error's, one error of each."""
+    """Return what the compiler says of other lines of the package's own sources, the first of each line, in the order
+    in which it says so."""
     matches = filter(None, map(_COMPILER_ERROR.match, lines if first.kind == "compiler" else ()))
-    found = (_of_compiler(match, package, None) for match in matches)
-    by_line = {
-        one.place.line: one
-        for one in found
-        if one.place and first.place and one.place.file == first.place.file
-    }
-    return [one for line, one in by_line.items() if first.place and line != first.place.line]
+    found = dict[FileCitation | None, BuildError]()
+    for one in (_of_compiler(match, package, None) for match in matches):
+        found.setdefault(one.place, one)
+    return [one for place, one in found.items() if place not in {None, first.place}]
 
 
 def _callers(lines: Sequence[str]) -> list[tuple[str, int]]:
