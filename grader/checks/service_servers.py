@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from itertools import combinations
+from itertools import combinations, product
 from typing import Annotated, Any
 
 from pydantic import Field, model_validator
@@ -135,7 +135,7 @@ def service_answers(package: PackageFacts, run: Run, params: ServiceAnswersParam
     made = exchanges(run, params.service)
     pairs = list(zip(made, params.expect, strict=False))
     faults = [(one, v) for one, w in pairs if (v := _fault(one, w, package, run, params))]
-    if faults and (hint := _exchanged(pairs, params)):
+    if faults and (hint := _exchanged(pairs, params) or _letters(pairs)):
         faults = [(one, verdict.model_copy(update={"hint": hint})) for one, verdict in faults]
     wrong = faults[0] if faults else None
     right = len(pairs) - len(faults)
@@ -253,6 +253,20 @@ def _exchanged(pairs: Sequence[tuple[Exchange, dict[str, Any]]], params: Service
                 f"{kind}Response({first}=…, {second}=…)", f"response.{first} = …; response.{second} = …;"
             )
             return f"{first} and {second} have each other's values: write each by its name, {by_name}"
+    return ""
+
+
+def _letters(pairs: Sequence[tuple[Exchange, dict[str, Any]]]) -> str:
+    """Return what to do where each answer is how many letters a text of the request has, in place of words; else ""."""
+    texts = {name for one, _ in pairs for name, value in one.request.items() if isinstance(value, str)}
+    for name, field in product(sorted(texts), sorted({field for _, wanted in pairs for field in wanted})):
+        asked = [(str(one.request.get(name, "")), one, wanted) for one, wanted in pairs]
+        if all(
+            one.response is not None
+            and wanted.get(field) == len(text.split()) != len(text) == one.response.get(field)
+            for text, one, wanted in asked
+        ):
+            return f"`len(…)` of a text counts its letters; `len(request.{name}.split())` counts its words"
     return ""
 
 
