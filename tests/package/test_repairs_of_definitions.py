@@ -261,6 +261,13 @@ CASES = {
         {"src/serve.py": SERVE_SUM.replace(".x + one.y", ".a + one.b"),
          "srv/Two.srv": "int64 a\nint64 b\n---\nint64 sum\n"},
     ),
+    "own-service-with-other-fields-in-both-parts": Case(
+        {"src/serve.py": SERVE_SUM, "srv/Two.srv": "int64 x\nint64 y\n---\nint64 sum\n", CMAKELISTS: SERVICE_CMAKE},
+        ["build-line"] * 3 + ["missing-call"], "write `int64 total`",
+        asking(definitions=(("srv/Two.srv", tuple(
+            parse_definition("int64 first\nint64 second\n---\nint64 total", ".srv"))),)),
+        {"srv/Two.srv": "int64 first\nint64 second\n---\nint64 total\n"},
+    ),
     "own-service-with-other-fields-that-a-pose-has": Case(
         {"src/serve.py": f"from geometry_msgs.msg import Pose2D\n{SERVE_SUM}", CMAKELISTS: SERVICE_CMAKE,
          "srv/Two.srv": "int64 x\nint64 y\n---\nint64 sum\n"},

@@ -148,9 +148,9 @@ def _correct_names(
         for given in (fields, own.fields)
     ]
     pairs = under_other_names(fields, own.fields, name) if types[0] == types[1] else []
-    initials = [(wanted.name[0].lower(), one.name[0].lower()) for wanted, one in pairs]
+    initials = [(one.part, wanted.name[0].lower(), one.name[0].lower()) for wanted, one in pairs]
     # `high` and `low` in place of `lower` and `higher` may be in another order
-    is_crossed = any(a != b and b in {first for first, _ in initials} for a, b in initials)
+    is_crossed = any(b != a and (part, b) in {one[:2] for one in initials} for part, a, b in initials)
     if pairs and not is_crossed:
         _rename_fields(files, package, own.path, {one: wanted.name for wanted, one in pairs})
     return parse_interface((files.text(own.path) or "").encode(), own.path)
