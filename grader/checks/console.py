@@ -247,7 +247,7 @@ def _nothing_printed(package: PackageFacts, run: Run, params: PrintsParams, hint
         return failed_or_blocked(f"{nothing}: {keys.message}", hint=keys.fix)
     verdict = failed_or_blocked(nothing, hint=python_or_cpp(f"{hint}, with flush=True", hint))
     could = line_that_prints(package, run, lambda text: any(params.found_in(Line(0, text))))
-    return not_reached(verdict, could) if could else verdict
+    return not_reached(verdict, could, package) if could else verdict
 
 
 def _unseen(one: Life, package: PackageFacts, run: Run, params: PrintsParams, never: str) -> Verdict | None:

@@ -13,6 +13,7 @@ from collections import Counter, defaultdict
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from functools import partial
 from itertools import accumulate
+from pathlib import PurePosixPath
 from typing import Literal, NamedTuple
 
 from grader.checks.support.processes import Life, run_slips
@@ -537,8 +538,14 @@ def line_that_prints(package: PackageFacts, run: Run, could_be: Callable[[str], 
     return next((s for s in run_slips(package, run, "prints") if could_be(filled(s))), None)
 
 
-def not_reached(verdict: Verdict, slip: PythonSlip) -> Verdict:
-    """Return a loss with the line that prints what is missing, and was never reached."""
+def not_reached(verdict: Verdict, slip: PythonSlip, package: PackageFacts) -> Verdict:
+    """Return a loss with the line that prints what is missing, and was never reached; or that logs it where no node is
+    made, so that it goes nowhere."""
+    no_node = any((one.kind, one.file) == ("no-init", slip.file) for one in package.slips)
+    if no_node and slip.name.startswith(("loginfo", "logdebug")):
+        why = f"line {slip.line} of {slip.file} does, and without `rospy.init_node(…)` nothing that is logged is shown"
+        name = PurePosixPath(slip.file).stem
+        return verdict.explained(why, f"write `rospy.init_node('{name}')` below the imports", (slip.place,))
     why = f"line {slip.line} of {slip.file} does, and is never reached"
     hint = f"see what keeps line {slip.line} from being reached: print what the condition above it compares"
     return verdict.explained(why, hint, (slip.place,))
