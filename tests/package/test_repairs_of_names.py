@@ -179,9 +179,16 @@ def test_no_function_of_python_is_meant_where_it_would_get_no_value() -> None:
         ("'Received: ' + str(data)", None),
         ("data + 1", None),
         ("('' + data for data in 'ab')", None),
+        ("data == 'stop'", "data.data == 'stop'"),
+        ("'stop' != data", "'stop' != data.data"),
+        ("data.data == 'stop'", None),
+        ("data is None", None),
+        ("1)\n    word = data\n    print(word in 'ab', word == 'a'",
+         "1)\n    word = data.data\n    print(word in 'ab', word == 'a'"),
+        ("1)\n    word = data\n    print(word.data == 'a'", None),
     ],
-)
-def test_a_message_is_not_added_to_a_string(printed: str, right: str | None) -> None:
+)  # fmt: skip
+def test_a_message_is_no_string(printed: str, right: str | None) -> None:
     text = "import rospy\nfrom std_msgs.msg import String\n\n\ndef hear(data):\n    print({})\n\n\n"
     text += "rospy.init_node('listener')\nrospy.Subscriber('chatter', String, hear)\nrospy.spin()\n"
     (found,) = list(examine([["a.py", text.format(printed)]], [], {}, ""))

@@ -370,7 +370,7 @@ WITH_INNER = (ast.Attribute, ast.Call, ast.Subscript)
 
 
 def _whole_messages(text: str, known: Known) -> Iterator[tuple[Edit, str]]:
-    """Yield `'I heard ' + msg` in a callback, for `'I heard ' + str(msg.data)`."""
+    """Yield `'I heard ' + msg` in a callback, for `'I heard ' + str(msg.data)`; and `msg == 'stop'`, for `msg.data`."""
     tree, lines = tree_of(text), text.split("\n")
     messages = _messages_of_callbacks(tree, known.fields(tree))
     stored = {n.id for n in nodes_in(tree) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)}
@@ -384,6 +384,31 @@ def _whole_messages(text: str, known: Known) -> Iterator[tuple[Edit, str]]:
             if span is not None and isinstance(one, ast.Name) and one.id not in stored:
                 why = f"`{one.id}` is the whole message, and no string can be added to it"
                 yield (span, f"str({one.id}.data)"), why
+    for one, name in _compared_names(tree):
+        span = span_of(lines, one) if messages.get(id(one)) == MEMBERS["message"] else None
+        if span is not None and one.id not in stored:
+            yield (
+                (span, f"{one.id}.data"),
+                f"`{name}` is the whole message, and is compared with what is in it",
+            )
+
+
+def _compared_names(tree: ast.Module) -> Iterator[tuple[ast.Name, str]]:
+    """Yield the names that are compared with a value, `msg == 'stop'`; or what such a name is given alone, in
+    `command = msg`."""
+    nodes = nodes_in(tree)
+    tests = [[n.left, *n.comparators] for n in nodes if isinstance(n, ast.Compare)]
+    plain = [t for t in tests if any(isinstance(p, ast.Constant) and p.value is not None for p in t)]
+    names = [part for test in plain for part in test if isinstance(part, ast.Name)]
+    yield from ((one, one.id) for one in names)
+    compared = {one.id for one in names} - {
+        ast.unparse(n.value) for n in nodes if isinstance(n, ast.Attribute)
+    }
+    for node in nodes:
+        target = node.targets[0] if isinstance(node, ast.Assign) and len(node.targets) == 1 else None
+        given = getattr(node, "value", None)
+        if isinstance(target, ast.Name) and target.id in compared and isinstance(given, ast.Name):
+            yield given, target.id
 
 
 def _counted_messages(text: str, _known: Known) -> Iterator[tuple[Edit, str]]:
