@@ -545,7 +545,7 @@ def _process_for_node(criterion: WrittenCriterion, rubric: WrittenRubric) -> Ite
 def _sent(scenario: dict[str, Any]) -> int:
     """Return how many messages the grader sends in a run; 0 where it sends none, or something else may."""
     is_script = all(start.get("script") for start in starts_of(scenario))
-    if not is_script or given_steps(scenario, "play"):
+    if not is_script or "serves" in scenario or given_steps(scenario, "play"):
         return 0
     number = 0
     for one in published_in(scenario):

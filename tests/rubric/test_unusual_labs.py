@@ -43,6 +43,12 @@ CLIENT = """\
     serves: [{service: /get, type: rospy_tutorials/AddTwoInts, answer: {sum: 8}}]
     until: {ended: [client]}"""
 
+TELLS = """\
+  tells:
+    title: Tells
+    start: [{name: client, script: client.py}]
+    serves: [{action: /count, type: lab1/Count, feedback: [{count: 1}, {count: 2}]}]
+    steps: [publish: {topic: /go, type: std_msgs/Empty, value: {}}, wait: {topic: /told, messages: 2}]"""
 WHEELS = """\
   turns:
     title: Turns
@@ -102,6 +108,9 @@ TURNS = """\
         ("asks /get and prints twice the sum", CLIENT,
          ["check: prints, with: {process: client, text: '{number}', numbers: [8]}, scenario: four",
           "check: prints, with: {process: client, text: '{number}', numbers: [16]}, scenario: eight"]),
+        # an action's feedback sets off messages too
+        ("tells each feedback of /count on /told, and each order on /go", TELLS,
+         ["check: field-equals, with: {topic: /told, field: data, values: [1, 2]}, scenario: tells"]),
         # a factor of a formula is no value that a node may always use
         ("wheels hears /turn, in radians a second, and publishes turn / 2 on /right", WHEELS,
          ["check: field-equals, with: {topic: /right, field: data, value: {made_up: right}}, scenario: turns"]),
