@@ -5,11 +5,10 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import combinations
-from pathlib import PurePosixPath
 from typing import Annotated, Any
 
 from grader.checks.registry import Refers, check
-from grader.checks.support.console_output import Line, printed_lines
+from grader.checks.support.console_output import Line, of_no_node, printed_lines
 from grader.checks.support.fields import differences, is_number, value_text
 from grader.checks.support.parameters import (
     Given,
@@ -30,6 +29,7 @@ from grader.checks.support.processes import (
     lives,
     named_at,
     not_started,
+    run_scripts,
     run_slips,
 )
 from grader.checks.support.text import get_param, log_param, near_names, set_param, shown
@@ -158,7 +158,7 @@ def _not_printed(
         lost = _share_printed(params, missing, message, log_param(missing[0]))
         stuck = run_slip(package, run, "stuck")
         lost = lost.explained(stuck.message, stuck.fix, (stuck.place,)) if stuck is not None else lost
-        return lost if texts else _of_no_node(package, run, lost)
+        return lost if texts else of_no_node(lost, package, run_scripts(run))
     hint = f"read {missing[0]} into a variable above the line that sets it, and print that variable"
     why = f"{message}: it is set to that value before it is read"
     cited = named_at(package, run, "sets-parameter", missing[0])
@@ -344,16 +344,7 @@ def _not_logged(package: PackageFacts, run: Run, params: ParamsSetParams) -> Ver
     if end := explain_failure(package, run):
         return end.verdict(failed, f"{message}: the node ended with {end.cause}")
     lost = failed(message, hint=log_param(params.name))
-    return lost if printed_lines(run) else _of_no_node(package, run, lost)
-
-
-def _of_no_node(package: PackageFacts, run: Run, verdict: Verdict) -> Verdict:
-    """Explain what is not printed by a script that is no node, where it is none: rospy does not show its log then."""
-    if (slip := run_slip(package, run, "no-init")) is None:
-        return verdict
-    name = PurePosixPath(slip.file).stem
-    hint = f"in {slip.file}, call `rospy.init_node('{name}')` above the first line that logs something"
-    return verdict.explained(f"{slip.message}, and without a node nothing is logged", hint, (slip.place,))
+    return lost if printed_lines(run) else of_no_node(lost, package, run_scripts(run))
 
 
 class ParamValueParams(Record):

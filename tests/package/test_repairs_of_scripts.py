@@ -298,7 +298,7 @@ CASES = {
         after={TALKER: "def heard(msg):\n    global front\n    front = msg.data\n"},
     ),
     "variable-that-a-callback-shows": Case(
-        swapped(TALKER, ("\ndef main():", "\nup = 1\n\ndef heard(msg):\n    up = msg.data\n    print(up)\n\ndef main():"),
+        swapped(TALKER, ("\ndef main():", "\nup = 1\ndef heard(msg):\n    up = msg.data\n    print(up)\n\ndef main():"),
                         ("        rate.s", "        print(up)\n        rate.s")),
         ["missing-call"], "a value to a variable up of its own"),
     "variables-of-a-callback": Case(

@@ -123,6 +123,16 @@ def node(body: str) -> str:
     return f"import rospy\ndef main():\n    rospy.init_node('a')\n{body}"
 
 
+LOOPS_OF_TWO = """\
+def one():
+    while not rospy.is_shutdown():
+        p.publish(1)
+def two():
+    while not rospy.is_shutdown():
+        q.publish(2)
+one()
+two()
+"""
 LOOP = "    while not rospy.is_shutdown():\n"
 SERVER = "    s = SimpleActionServer('a', A, f, auto_start=False)\n"
 OF_A = "try:\n    from a.msg import A\nfinally:\n    pass\n"
@@ -252,8 +262,7 @@ CALLED = "if __name__ == '__main__':\n    main()\n"
         (node("    p.publish(1)\n" + LOOP + "        work()\n        rate.sleep()\n") + CALLED, []),
         (node("    p.publish(1)\n" + LOOP + "        rate.sleep()\n    p.publish(2)\n") + CALLED,
          [("never-reached", 5, "the publish(…) on line 7")]),
-        ("def one():\n    while not rospy.is_shutdown():\n        p.publish(1)\n"
-         "def two():\n    while not rospy.is_shutdown():\n        q.publish(2)\none()\ntwo()\n",
+        (LOOPS_OF_TWO,
          [("never-reached", 2, "the two(…) on line 8 is never reached: one loop has to do both")]),
         (node("    for i in range(9):\n        p.publish(1)\n") + CALLED,
          [("loop-left", 4, "write `while not rospy.is_shutdown():` on line 4")]),

@@ -538,14 +538,21 @@ def line_that_prints(package: PackageFacts, run: Run, could_be: Callable[[str], 
     return next((s for s in run_slips(package, run, "prints") if could_be(filled(s))), None)
 
 
+def of_no_node(verdict: Verdict, package: PackageFacts, scripts: Collection[str | None]) -> Verdict:
+    """Return the verdict; where one of the scripts makes no node, so that what it logs is shown nowhere, with that."""
+    found = (s for s in package.slips if s.kind == "no-init" and s.file in scripts)
+    if (slip := next(found, None)) is None:
+        return verdict
+    why = f"{slip.message}, without which nothing that is logged is shown"
+    hint = f"in {slip.file}, write `rospy.init_node('{PurePosixPath(slip.file).stem}')` below the imports"
+    return verdict.explained(why, hint, (slip.place,))
+
+
 def not_reached(verdict: Verdict, slip: PythonSlip, package: PackageFacts) -> Verdict:
-    """Return a loss with the line that prints what is missing, and was never reached; or that logs it where no node is
-    made, so that it goes nowhere."""
-    no_node = any((one.kind, one.file) == ("no-init", slip.file) for one in package.slips)
-    if no_node and slip.name.startswith(("loginfo", "logdebug")):
-        why = f"line {slip.line} of {slip.file} does, and without `rospy.init_node(…)` nothing that is logged is shown"
-        name = PurePosixPath(slip.file).stem
-        return verdict.explained(why, f"write `rospy.init_node('{name}')` below the imports", (slip.place,))
+    """Return a loss with the line that prints what is missing, and was never reached; or that logs it in no node."""
+    unlogged = of_no_node(verdict, package, [slip.file]) if slip.name in ("loginfo", "logdebug") else verdict
+    if unlogged is not verdict:
+        return unlogged.about(citations=(slip.place, *verdict.citations))
     why = f"line {slip.line} of {slip.file} does, and is never reached"
     hint = f"see what keeps line {slip.line} from being reached: print what the condition above it compares"
     return verdict.explained(why, hint, (slip.place,))

@@ -219,21 +219,24 @@ class Printing:
         told = [n for n in self.prints if self.of_message(n)]
         if self.is_elsewhere(tree, collects=bool(told)):
             return None if self.prints else self.dropped(tree)
-        if self.lost and told and told[0].lineno > self.lost:
-            message = "line %d gives what holds the message another value before line %d prints it"
-            message %= (self.lost, told[0].lineno)
-            return self.lost, "not-printed", message, "delete line %d" % self.lost
-        ends = [one.lineno for one in self.body if isinstance(one, LEAVES)] if told else []
-        if ends and ends[0] < told[0].lineno:
-            message = "line %d ends the callback before line %d prints the message"
-            return ends[0], "not-printed", message % (ends[0], told[0].lineno), "delete line %d" % ends[0]
         if told:
-            return self.in_part(told)
+            return self.too_early(told[0].lineno) or self.in_part(told)
         if not self.prints:
             debug = any(called_name(n).startswith("logdebug") and self.of_message(n) for n in self.nodes)
             kept = self.kept(tree) if self.shared else None
             return kept or (self.silent(level) if debug or not self.is_read(tree) else None)
         return self.another()
+
+    def too_early(self, printed):
+        """What another value, or the callback's end, comes to before the line that would print it."""
+        ends = next((one.lineno for one in self.body if isinstance(one, LEAVES)), printed)
+        message = "line %d gives what holds the message another value before line %d prints it"
+        if ends < printed:
+            message = "line %d ends the callback before line %d prints the message"
+        line = ends if ends < printed else self.lost
+        if not line or line >= printed:
+            return None
+        return line, "not-printed", message % (line, printed), "delete line %d" % line
 
     def logged(self, tree):
         """What goes into a log file alone: `logging.info(…)`, for which ROS has set up no other way."""
