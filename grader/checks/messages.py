@@ -11,7 +11,7 @@ from pydantic import Field
 
 from grader.checks.registry import check
 from grader.checks.support.clocks import ASK_AGAIN, WATCHED_S, clocks_at, wrong_growth
-from grader.checks.support.counters import wrong_count
+from grader.checks.support.counters import Count, CounterParams, cite_slip, judge_steps, wrong_steps
 from grader.checks.support.exit_causes import explain_early_end
 from grader.checks.support.processes import OnTopic, early_end, is_flood, observed_until_ns, slips_of
 from grader.checks.support.recorder_losses import losses
@@ -38,9 +38,11 @@ from grader.model.verdict import (
     grade_again,
     passed,
 )
-from grader.wording import plural
+from grader.wording import plural, significant
 
 ENOUGH = 3
+NEVER = 2**64
+"""As a maximum: no counter comes so far."""
 _HOURS = re.compile(r"\d:[0-5]\d:$")
 """Hours and minutes before the seconds: a time, and not one in seconds."""
 _FUNCTION = re.compile(r"<(?:built-in )?(?:function|bound method|method) (?:\w+\.)*(\w+)")
@@ -90,7 +92,7 @@ def message(package: PackageFacts, run: Run, params: MessageParams) -> Verdict:
         # Words first: a time can be read only where it stands in its place.
         _misfit(package, run, heard, params)
         or _wrong_time(package, run, heard, params)
-        or wrong_count(package, run, heard, params.topic, params.template)
+        or _wrong_count(package, run, heard, params)
         or passed(f"all {count} messages on {params.topic} are '{in_words(params.template)}'{grows}")
     )
     measured = f"{in_one_line(heard[0].data[0])!r} to {in_one_line(heard[0].data[-1])!r} ({plural(count, 'message')})"
@@ -236,3 +238,35 @@ def _too_few(package: PackageFacts, run: Run, heard: Sequence[Channel], params: 
     if _watched_ns(run, heard) >= WATCHED_S * 1e9:
         return failed_or_blocked(f"{few}: {why}", hint="publish in the loop" + f"; {ASK_AGAIN}" * timed)
     return grade_again(f"{few} while it was watched: {why}")
+
+
+def _wrong_count(
+    package: PackageFacts, run: Run, channels: Sequence[Channel], params: MessageParams
+) -> Verdict | None:
+    """Return the verdict on texts whose `{count}` does not go up by one; None where each one's does, or the template
+    has no such place."""
+    if COUNT not in params.template:
+        return None
+    pattern, counter = message_pattern(params.template, NUMBER), CounterParams(topic=params.topic)
+    for channel in channels:
+        rows = zip(channel.data, channel.messages, strict=True)
+        told = [(float(found["count"]), m) for text, m in rows if (found := pattern.fullmatch(text))]
+        count = Count(
+            callerid=channel.callerid,
+            values=tuple(number for number, _ in told),
+            times_ns=tuple(m.log_time_ns for _, m in told),
+            sequences=tuple(m.sequence for _, m in told),
+        )
+        # A text is not bounded as a number's type is: nothing makes the count begin again.
+        fall = next((s for s in count.steps if s.change < -1), None)
+        if fall is not None:
+            comes = f"after {significant(fall.before)} comes {significant(fall.after)}"
+            return failed(
+                f"the counter begins again: {comes}",
+                hint="set the counter once, before the loop, and reset it nowhere",
+            )
+        steps = wrong_steps(count, run, maximum=NEVER, rate_hz=counter.rate_hz)
+        if (verdict := judge_steps(count, steps, run, counter)) is not None:
+            stays = count.usual_step() == 0
+            return cite_slip(verdict, count, run, package, "no-effect", "set-in-loop") if stays else verdict
+    return None

@@ -17,7 +17,7 @@ from grader.checks.support.fields import FieldPath, NoField, values_at
 from grader.checks.support.processes import OnTopic, observed_until_ns, slips_of
 from grader.checks.support.recorder_losses import losses, whole_until_ns
 from grader.checks.support.services import answers_between
-from grader.checks.support.text import COUNT, NUMBER, loop_rate, message_pattern
+from grader.checks.support.text import loop_rate
 from grader.evidence.run import Channel, Run, once_for_each_run
 from grader.model.package import PackageFacts
 from grader.model.python_slip import PythonSlip, SlipKind
@@ -31,8 +31,6 @@ SYSTEMATIC_SHARE = 0.05
 STUCK_COUNT = 5
 LEAST_AFTER_START = 3
 LARGEST = 2.0**64
-NEVER = 2**64
-"""As a maximum: no counter comes so far."""
 LOST_GAP_SHARE = 0.75
 """Of the time that lost values would have taken: a longer gap is a machine that stood still for longer."""
 STALL_PERIODS = 2
@@ -206,40 +204,13 @@ def judge_steps(count: Count, found: Wrong, run: Run, params: CounterParams) -> 
 
 
 def _usual_fault(usual: float) -> str:
-    if usual == 0:
-        return "stays at one value"
-    return f"counts in steps of {significant(usual)}" if usual > 0 else "counts down"
-
-
-def wrong_count(
-    package: PackageFacts, run: Run, channels: Sequence[Channel], topic: str, template: str
-) -> Verdict | None:
-    """Return the verdict on texts whose `{count}` does not go up by one; None where each one's does, or the template
-    has no such place."""
-    if COUNT not in template:
-        return None
-    pattern, params = message_pattern(template, NUMBER), CounterParams(topic=topic)
-    for channel in channels:
-        rows = zip(channel.data, channel.messages, strict=True)
-        told = [(float(found["count"]), m) for text, m in rows if (found := pattern.fullmatch(text))]
-        count = Count(
-            callerid=channel.callerid,
-            values=tuple(number for number, _ in told),
-            times_ns=tuple(m.log_time_ns for _, m in told),
-            sequences=tuple(m.sequence for _, m in told),
-        )
-        # A text is not bounded as a number's type is: nothing makes the count begin again.
-        fall = next((s for s in count.steps if s.change < -1), None)
-        if fall is not None:
-            message = (
-                f"the counter begins again: after {significant(fall.before)} comes {significant(fall.after)}"
-            )
-            return failed(message, hint="set the counter once, before the loop, and reset it nowhere")
-        steps = wrong_steps(count, run, maximum=NEVER, rate_hz=params.rate_hz)
-        if (verdict := judge_steps(count, steps, run, params)) is not None:
-            stays = count.usual_step() == 0
-            return cite_slip(verdict, count, run, package, "no-effect", "set-in-loop") if stays else verdict
-    return None
+    return (
+        "stays at one value"
+        if usual == 0
+        else f"counts in steps of {significant(usual)}"
+        if usual > 0
+        else "counts down"
+    )
 
 
 def steps_to_judge(count: Count, maximum: int) -> tuple[Step, ...]:
