@@ -87,7 +87,8 @@ async def build(
             place, arena, _catkin_make(place, headers), beside, with_base=wants_base
         )
         ok = arena.exit_codes.get(CATKIN_MAKE) == 0
-        built = await _with_setup(place, arena) if ok else place.from_source()
+        # behind a program that does not compile, messages and other programs are there all the same
+        built = await _with_setup(place, arena) if ended else place.from_source()
         for package, scripts in ((None, answers), *answers_of.items()):
             own = built.of(package)
             for script in scripts if own else ():

@@ -206,9 +206,12 @@ def _with_repaired_copy(
     """Return the verdicts with what the runs of a repaired copy say besides, and the repairs that criteria rest on."""
     rubric, first, repaired = facts.rubric, runs.first, runs.repaired
     repairs = repairs_of(rubric, repaired)
-    # a build that goes on as far as what the machine lacks shows what the repaired line kept from being made
+    # a build that goes on as far as what the machine lacks, or makes messages before a program does not compile, shows
+    # what the repaired line kept from being made
     shows = was_built(repaired) or any(
-        v.basis.of_machine and verdicts[i].status.is_lost for i, v in on_copy.items()
+        (v.basis.of_machine and verdicts[i].status.is_lost)
+        or (verdicts[i].basis.unbuilt and not v.status.is_lost)
+        for i, v in on_copy.items()
     )
     verdicts, uses = apply_repaired_copy(
         rubric,

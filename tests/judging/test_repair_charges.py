@@ -613,3 +613,33 @@ def test_all_that_one_repair_adds_is_told_beside_another_repair() -> None:
     verdict = failed("no folder include/", hint="; ".join([removed.fix, *each]))
     told = charged_verdict(verdict, passed("catkin_make succeeded"), [added, removed], ())
     assert all(one in told.hint for one in [*each, removed.fix])
+
+
+def test_what_the_copy_makes_before_another_program_does_not_compile_counts() -> None:
+    line = Repair(
+        kind="build-line",
+        file="CMakeLists.txt",
+        line=9,
+        before="  INCLUDE_DIRS include",
+        after="",
+        message="catkin_package(…) names the folder include/",
+        fix="remove INCLUDE_DIRS include",
+    )
+    files = [SCRIPT, {"path": "CMakeLists.txt"}, {"path": "msg/Num.msg"}, {"path": "src/mean.cpp"}]
+    package = {**PACKAGE, "files": files, "interfaces": [{"path": "msg/Num.msg", "fields": []}]}
+    lacks = died("ModuleNotFoundError: No module named 'lab1'", 3)
+    runs = build_runs({"runs": {"talker": lacks}, "package": package})
+    runs |= built(
+        package,
+        exit_code=1,
+        said=[
+            "CMake Error at lab1/CMakeLists.txt:9 (catkin_package):",
+            "  catkin_package() include dir 'include' does not exist",
+        ],
+    )
+    copy = build_runs({"runs": {"talker": GOOD_RUN}, "package": package})
+    copy |= built(package, exit_code=1, said=["/w/src/lab1/src/mean.cpp:3:1: error: 'x' was not declared"])
+    runs |= on_copy(copy, line)
+    asked = rubric({"id": "build", "check": "build"}, {**NODE, "requires": []})
+    build, node = judge(asked, runs)
+    assert (build.status.value, node.status.value) == ("fail", "partial")
