@@ -281,6 +281,14 @@ CASES = {
         {TALKER: SCRIPT, "src/own.py": "from std_msgs.msg import Int8\ndef f():\n    m = Int8\n    print(m)\n"
          "def g():\n    m = Int8()\n    m.data = 1\n"}, [],
     ),
+    "rate-before-the-node": Case(
+        {TALKER: SCRIPT.replace("def main():\n", "def main():\n    early = rospy.Rate(5)\n    name = 'a'\n", 1)},
+        ["missing-call"], "move `rospy.init_node(…)` from line 8 up, above line 6",
+    ),
+    "rate-that-the-node-needs-a-name-behind": Case(
+        {TALKER: SCRIPT.replace("def main():\n", "def main():\n    early = rospy.Rate(5)\n    name = 'a'\n", 1)
+         .replace("init_node(", "init_node(name + ")}, [],
+    ),
     "variable-of-the-file": Case(
         swapped(
             TALKER,

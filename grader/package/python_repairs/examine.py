@@ -53,6 +53,7 @@ from grader.package.python_repairs.rospy_names import (
     with_call_imported,
     with_init,
     with_logger,
+    with_node_first,
     with_rospy,
 )
 from grader.package.python_repairs.shared_variables import with_globals
@@ -151,6 +152,7 @@ def _steps(text: str, types: list[str], known: Known, node: str, *, is_run: bool
             with_lines_turned,
             _with_lines_inside,
             _with_start,
+            with_node_first,
             *((_with_main, lambda t: with_init(t, node), _with_server_started, _with_spin) if is_run else ()),
         ):
             for step in repair(text):

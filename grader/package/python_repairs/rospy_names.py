@@ -1,5 +1,5 @@
 """Repairs of names that rospy lacks: its own in other letters, and those of ROS 2 and roscpp; and of a script that
-never makes its node.
+never makes its node, or too late.
 
 The text of a script that parses comes in, and the steps go out that repair it, as in `examine.py`. It runs in a
 child process: the standard library only, and nothing is executed.
@@ -245,6 +245,44 @@ def with_init(text: str, name: str) -> Iterator[Step]:
     if not before.strip():
         after = "\n".join([*lines[:at], before + line, *lines[at:]])
         yield from step_to("init", at + 1, text, after, line)
+
+
+NEED_NODE = ("Rate", "sleep", "get_time", "get_rostime", "Time.now", "wait_for_message")
+"""What fails in rospy before the node is made."""
+
+
+def with_node_first(text: str) -> Iterator[Step]:
+    """A script that makes its node below a line of the same block that needs it: `init_node` moves up."""
+    tree, lines = tree_of(text), text.split("\n")
+    needing = {f"{rospy_in(tree)}.{name}" for name in NEED_NODE}
+    blocks = (
+        getattr(node, part, None) for node in nodes_in(tree) for part in ("body", "orelse", "finalbody")
+    )
+    for block in (one for one in blocks if isinstance(one, list)):
+        calls = [one.value if isinstance(one, ast.Expr) else None for one in block]
+        place = next(
+            (i for i, one in enumerate(calls) if last_name(getattr(one, "func", None)) == "init_node"), 0
+        )
+        early = [i for i, one in enumerate(block[:place]) if not needing.isdisjoint(_called_now(one))]
+        if not early:
+            continue
+        first, init, end = block[early[0]], block[place], block[place].end_lineno or 0
+        between = {name for one in block[early[0] : place] for name in bound_in(one)}
+        alone = not lines[init.lineno - 1][: init.col_offset].strip() and lines[end - 1].rstrip().endswith(
+            ")"
+        )
+        if alone and between.isdisjoint(n.id for n in nodes_in(init) if isinstance(n, ast.Name)):
+            at, moved = first.lineno - 1, lines[init.lineno - 1 : end]
+            after = [*lines[:at], *moved, *lines[at : init.lineno - 1], *lines[end:]]
+            yield from step_to("late", first.lineno, text, "\n".join(after), str(init.lineno))
+            return
+
+
+def _called_now(statement: ast.stmt) -> set[str]:
+    """Return what a statement calls, a definition nothing."""
+    if isinstance(statement, ast.FunctionDef | ast.ClassDef):
+        return set()
+    return {ast.unparse(n.func) for n in nodes_in(statement) if isinstance(n, ast.Call)}
 
 
 def _is_head(statement: ast.stmt) -> bool:

@@ -38,12 +38,13 @@ ATTEMPTS = 3
 Cause = Literal[
     "merged", "tabs", "level", "indent", "braces", "commented", "python2", "characters", "token", "global", "outside",
     "old-name", "module", "other-module", "import", "name", "quotes", "attribute", "value", "call", "quoted",
-    "callback", "argument", "unbound", "kept", "guard", "inside", "start", "main", "init", "server", "spin", "line",
+    "callback", "argument", "unbound", "kept", "guard", "inside", "start", "late", "main", "init", "server", "spin",
+    "line",
     "twice", "turned", "empty", "emptied",
 ]  # fmt: skip
 CALLS = (
     "name", "quotes", "attribute", "value", "call", "quoted", "callback", "argument", "unbound", "kept", "guard",
-    "inside", "start", "main", "init", "server", "spin",
+    "inside", "start", "late", "main", "init", "server", "spin",
 )  # fmt: skip
 KINDS: dict[str, RepairKind] = {
     **dict.fromkeys(("module", "other-module", "import"), "missing-import"),
@@ -116,7 +117,7 @@ def _until(steps: Sequence[_Step], causes: Collection[Cause]) -> Iterator[_Step]
     return takewhile(lambda step: step.cause not in causes, steps)
 
 
-OF_START: tuple[Cause, ...] = ("inside", "start", "main", "init", "server", "spin")
+OF_START: tuple[Cause, ...] = ("inside", "start", "late", "main", "init", "server", "spin")
 """Causes that keep a script from starting, which come last."""
 
 
@@ -483,6 +484,8 @@ WORDS: dict[Cause, tuple[str, str]] = {
     "start": ("{place}: the lines from here on belong to {calls}, so nothing runs them", ""),
     "inside": ("{place}: from here on the lines are outside of {calls}, which makes the node",
      "change the indentation: "),
+    "late": ("{place} uses ROS before `rospy.init_node(…)`",
+     "move `rospy.init_node(…)` from line {word} up, above line {line}"),
     "main": ("{place}: nothing calls {calls}", "add `if __name__ == '__main__':`, and {calls} below it"),
     "init": ("{file} never calls `rospy.init_node(…)`, so it makes no node", ""),
     "server": ("{place}: the action server of line {line} is never started", "below line {line}, write `{word}`"),
