@@ -194,7 +194,7 @@ def published_unchanged(tree):
     set_at, made = {}, {}
     for n in walk(tree):
         if isinstance(getattr(n, "ctx", None), ast.Store):
-            set_at.setdefault(dotted(n).partition(".")[0], []).append(n.lineno)
+            set_at.setdefault(dotted(n).partition(".")[0], []).append(dotted(n))
         if isinstance(n, ast.Assign):
             made.update((dotted(t), n) for t in n.targets)
     plain = {dotted(t) for t in constants_in(walk(tree))}
@@ -209,11 +209,16 @@ def published_unchanged(tree):
         fresh = {n.id for n in names if isinstance(n.ctx, ast.Store)} - read
         for call in (n for n in told if called_name(n) == "publish" and len(n.args) == 1):
             name = dotted(call.args[0])
-            lines = set_at.get(name, [])
-            is_once = name in made and len(lines) == 1 and lines[0] < loop.lineno
-            if name in plain or name in used or not is_once:
+            stored = set_at.get(name, [])
+            fields = [
+                one for one in stored if one != name
+            ]  # of a message that is made above, they are what changes
+            parts = [one for one in fields or stored if one not in plain]
+            above = all(one in made and made[one].lineno < loop.lineno for one in stored)
+            if not parts or name in used or not above or len(set(stored)) < len(stored):
                 continue
-            line, moved = lines[0], lines_from(lines[0], made[name].end_lineno)
+            line, last = made[parts[0]].lineno, made[parts[-1]].end_lineno
+            moved = lines_from(line, last)
             fix = "move %s into that loop, above line %d" % (moved, loop.body[0].lineno)
             # another number that the loop works out, such as the time alone, is no text to be published
             alike = [one for one in fresh if one in made and alike_made(made[one].value, made[name].value)]
