@@ -80,13 +80,19 @@ OF_FILES = ("build", "cmake", "manifest")
 
 
 def keep_other_names(verdict: Verdict, criterion: Criterion, rubric: Rubric) -> Verdict:
-    """Return a verdict whose hint renames no topic and no service that another criterion asks for."""
+    """Return a verdict whose hint renames no topic and no service that another criterion asks for; and one that is
+    below the criterion's own, or above it, without a choice: `/cmd_vel/velocity` in place of `/cmd_vel`."""
     asked = {text for c in rubric.criteria if c.id != criterion.id for text in texts_in(c.parameters)}
 
     def without_asked(found: re.Match[str]) -> str:
         return rename_if_meant([name for name in re.findall(r"/[\w/]+", found["names"]) if name not in asked])
 
     hint = RENAME_IF_MEANT.sub(without_asked, verdict.hint)
+    named = re.findall(r"/[\w/]+", left["names"]) if (left := RENAME_IF_MEANT.search(hint)) else []
+    own = [text for text in texts_in(criterion.parameters) if text.startswith("/")]
+    for topic in own if len(named) == 1 else ():
+        if f"{named[0]}/".startswith(f"{topic}/") or f"{topic}/".startswith(f"{named[0]}/"):
+            hint = f"write {topic} in place of {named[0]}"
     return verdict if hint == verdict.hint else verdict.model_copy(update={"hint": hint})
 
 

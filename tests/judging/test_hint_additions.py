@@ -595,6 +595,8 @@ def test_no_topic_is_renamed_that_another_criterion_asks_for() -> None:
     for others, left in (
         ("/numeric_chatter", "add a publisher"),
         ("/numeric_chatter or /wrods", hint.format("/wrods")),
+        ("/chatter/text", "write /chatter in place of /chatter/text"),
+        ("/chatter/text or /wrods", hint.format("/chatter/text or /wrods")),
     ):
         verdict = failed("no message came on /chatter", hint=hint.format(others))
         assert keep_other_names(verdict, chatter, lab).hint == left
