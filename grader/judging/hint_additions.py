@@ -201,6 +201,7 @@ def _typed(package: PackageFacts, rubric: Rubric) -> Iterator[_Point]:
 def _nodes(package: PackageFacts, launch: LaunchFile, name: str) -> Iterator[_Point]:
     """Yield the nodes whose program is missing or not executable: roslaunch prints an error, and starts the others.
     `name` is the name that the lab asks the package to have."""
+    told = set[str]()
     for node in launch.brings:
         script, slip = own_script(package, node), node_slip(package, node)
         # a name that the manifest may be told to take is none to change here
@@ -212,6 +213,9 @@ def _nodes(package: PackageFacts, launch: LaunchFile, name: str) -> Iterator[_Po
             text = f"roslaunch leaves a <node> out: {slip.file}, line {slip.line}: {slip.why}; {slip.fix}"
             yield _Point(FileCitation(file=slip.file, line=slip.line), text, slip.lacks)
         elif script and script.executable is False and not _needs_no_bit(package, script.path):
+            if script.path in told:  # two nodes of one script
+                continue
+            told.add(script.path)
             why = not_executable(script)
             text = f"{why.why} ({node.file}, line {node.line}); {why.hint}"
             yield _Point(FileCitation(file=script.path), text)

@@ -57,7 +57,11 @@ pytestmark = pytest.mark.usefixtures("without_processes")
 
 OTHER = [{"name": "other", "script": "src/other.py"}]
 OUT = "roslaunch leaves a <node> out: launch/x.launch, line 2:"
-NODES = '<launch>\n<node pkg="lab1" type="talker" name="a"/>\n<node pkg="lab1" type="plain.py" name="b"/></launch>'
+NODES = """<launch>
+<node pkg="lab1" type="talker" name="a"/>
+<node pkg="lab1" type="plain.py" name="b"/>
+<node pkg="lab1" type="plain.py" name="c"/>
+</launch>"""
 
 
 def facts(folder, **files: str) -> PackageFacts:
