@@ -82,10 +82,8 @@ async def build(
     wants_base = place.sandbox.bubblewrap and not has_base(place) and len(os.sched_getaffinity(0)) > 1
     (place.folder / "bin" / "python-files.json").write_text(json.dumps(to_compile := list(python_files)))
     async with ArenaSession(place, writer, master=False, last_run=last_run) as arena:
-        beside = [_syntax_spec(place)] if to_compile else []
-        ended = await _run_catkin_make(
-            place, arena, _catkin_make(place, headers), beside, with_base=wants_base
-        )
+        make, beside = _catkin_make(place, headers), [_syntax_spec(place)] if to_compile else []
+        ended = await _run_catkin_make(place, arena, make, beside, with_base=wants_base)
         ok = arena.exit_codes.get(CATKIN_MAKE) == 0
         # behind a program that does not compile, messages and other programs are there all the same
         built = await _with_setup(place, arena) if ended else place.from_source()
