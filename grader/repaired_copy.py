@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 import posixpath
+import re
 import shutil
 from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
@@ -31,10 +32,11 @@ from grader.model.package import MANIFEST, PackageFacts
 from grader.model.repair import Repair
 from grader.model.result import CriterionResult, Progress, Silence, StepState
 from grader.model.submission import SourcePackage, Submission
+from grader.model.verdict import FileCitation
 from grader.package.manifest import parse_manifest
 from grader.package.repairs import NotRepairable, apply_repair, find_repairs, wanted_of
 from grader.package.repairs.editing import read_data
-from grader.package.repairs.python import ros_clock, turn_sign
+from grader.package.repairs.python import conversions, ros_clock, turn_sign
 from grader.rubric.model import Rubric
 
 STEERS_WRONG, WARPED = "steers-wrong", "warped"
@@ -63,6 +65,7 @@ def choose_repairs(
     if not lost and not blocked:
         return (), ()
     found = _find_in_all(submission, facts, rubric)
+    found += _of_errors(submission, criteria, found)
     # an `input()` waits for ever in a run in which nothing is typed
     typed = any(scenario.typed_to for scenario in rubric.scenarios.values())
     counting = [one for one in found if rubric.share_of(one.kind) > 0 and (typed or not one.asks_input)]
@@ -91,6 +94,25 @@ def choose_repairs(
     before = [one for one in counting if one.kind in DONE_BEFORE_RUNS and one.file not in made]
     before = [one for one in before if not is_first_line_added(one, rubric, chosen)]
     return (*before, *chosen), tuple(scenarios)
+
+
+CONVERTED = re.compile(r"write `(str|int|float)\(([^`]+)\)` instead of `\2`")
+
+
+def _of_errors(
+    submission: Submission, criteria: Sequence[CriterionResult], found: Collection[Repair]
+) -> Iterator[Repair]:
+    """Yield the repairs of what only a run shows: that a value is of another type than is needed on a line."""
+    known = {(one.file, one.line) for one in found}
+    for criterion in (one for one in criteria if one.status.is_lost and not one.blocked_by):
+        cited = next((one for one in criterion.citations if isinstance(one, FileCitation)), None)
+        told = CONVERTED.search(criterion.hint)
+        if told is None or cited is None or cited.line is None or cited.file.startswith("../"):
+            continue
+        for repair in conversions(submission.package.folder, cited.file, cited.line, told[1], told[2]):
+            if (repair.file, repair.line) not in known:
+                known.add((repair.file, repair.line))
+                yield repair
 
 
 def _choose_logic(

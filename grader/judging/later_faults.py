@@ -277,7 +277,8 @@ class Later:
         body = "\n".join(lines[max(self._function_at(slip) - 1, 0) : slip.line + CALL_LINES])
         named = re.match(r"\s*def (\w+)\((?:self, *)?(\w+)\)", body)
         is_callback = named is not None and self._is_given(named[1])
-        return is_callback and named is not None and not re.search(rf"\b{named[2]}\.|= *{named[2]}\b", body)
+        takes = rf"\b{named[2]}\.|= *{named[2]}\b|\.data\b" if named is not None else ""
+        return is_callback and not re.search(takes, body)
 
     def _is_given(self, callback: str) -> bool:
         """Return whether a line gives a Subscriber this callback, if perhaps called."""

@@ -187,7 +187,7 @@ pytestmark = pytest.mark.usefixtures("without_processes")
          "AttributeError: 'CountGoal' object has no attribute 'action_goal'",
          "write `actionlib.SimpleActionClient('/count', CountAction)`"),
         (6, "self.grid.data[row][column] = 100", "TypeError: 'int' object does not support item assignment",
-         "write `self.grid.data[row * width + column]`, where `width` is how many there are in a row"),
+         "write `self.grid.data[row * width + column]`, where `width` is how many are in a row"),
         (6, "if mean < LIMIT:", "TypeError: '<' not supported between instances of 'Float32' and 'float'",
          "write `if mean.data < LIMIT:`"),
         (6, "add(1, 2)", "TypeError: Invalid number of arguments, args should be ['a', 'b', 'c'] args are(1, 2)",

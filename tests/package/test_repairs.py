@@ -17,7 +17,7 @@ from grader.package.python_repairs.syntax import Step, step_to
 from grader.package.repairs import NotRepairable, apply_repair, find_repairs
 from grader.package.repairs.editing import changed_lines
 from grader.package.repairs.names import is_near, is_one_edit
-from grader.package.repairs.python import ros_clock
+from grader.package.repairs.python import conversions, ros_clock
 from grader.repaired_copy import REPAIRS_MAX, most_of
 from tests.package.repairing import (
     CMAKE,
@@ -537,3 +537,20 @@ def test_repairs_that_undo_each_other_end(monkeypatch: pytest.MonkeyPatch) -> No
     monkeypatch.setattr(examine, "with_names", turn_round)
     (found,) = examine.examine([["a.py", "a = 1\n"]], [], {}, "")
     assert [step["text"] for step in found["steps"]] == ["b = 1\n"]
+
+
+def test_what_a_run_ended_of_is_converted_there_and_where_the_same_is_joined_to_a_text(tmp_path):
+    code = (
+        "n = get()\nprint('a', n)\nlog('a: ' + n)\nlog('b: ' + n.data)\nlog('c: ' + str(n))\nlog('d: ' + n)\n"
+    )
+    (tmp_path / "a.py").write_text(code)
+    found = conversions(tmp_path, "a.py", 3, "str", "n")
+    assert [(one.line, one.after) for one in found] == [
+        (3, "log('a: ' + str(n))"),
+        (6, "log('d: ' + str(n))"),
+    ]
+    assert {one.fix for one in found} == {"write `str(n)` instead of `n`"}
+    for one in found:
+        apply_repair(tmp_path, one)
+    assert (tmp_path / "a.py").read_text() == code.replace("' + n)", "' + str(n))")
+    assert conversions(tmp_path, "b.py", 3, "str", "n") == []

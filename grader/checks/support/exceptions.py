@@ -63,7 +63,8 @@ SLIPS = {
        for old, new in {"xrange": "range", "unicode": "str", "basestring": "str", "long": "int", "unichr": "chr",
                         "reduce": "functools.reduce", "reload": "importlib.reload", "file": "open"}.items()},
     **{f"'dict' object has no attribute '{old}'": (f"`{old}` is Python 2", f"write `{new}`, as in Python 3")
-       for old, new in {"has_key": "key in …", **{f"iter{n}": n for n in ("items", "values", "keys")}}.items()},
+       for old, new in {"has_key": "key in d` for `d.has_key(key)", "iteritems": "items",
+                        "itervalues": "values", "iterkeys": "keys"}.items()},
     **{f"name '{old}' is not defined": (f"Python has no `{old}`", f"write `{new}` instead of `{old}`")
        for old, new in {"true": "True", "false": "False", "TRUE": "True", "FALSE": "False", "null": "None",
                         "NULL": "None", "nullptr": "None", "nil": "None", "none": "None", "this": "self",
@@ -301,9 +302,7 @@ def _nested_index(message: str, source: str) -> Meaning | None:
     if len(nested) != 1 or not isinstance(inner := nested[0].value, ast.Subscript):
         return None
     flat, row, column = (ast.unparse(part) for part in (inner.value, inner.slice, nested[0].slice))
-    fix = (
-        f"write `{shown(f'{flat}[{row} * width + {column}]')}`, where `width` is how many there are in a row"
-    )
+    fix = f"write `{shown(f'{flat}[{row} * width + {column}]')}`, where `width` is how many are in a row"
     return f"`{shown(flat)}` is one list of numbers, row after row", fix
 
 

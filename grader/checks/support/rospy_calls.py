@@ -13,6 +13,7 @@ from grader.checks.support.text import shown
 from grader.installable import noetic_messages
 from grader.line_slips.python import parsed
 from grader.model.package import PackageFacts
+from grader.model.python_slip import PythonSlip
 from grader.wording import join_words, on_lines
 
 Meaning = tuple[str, str]
@@ -387,6 +388,23 @@ def _out_of_range(message: str) -> Meaning | None:
     return why, f"publish only whole numbers from {bounds}: a counter has to start again in time"
 
 
+def _no_whole_number(source: str, sent: ast.Call | None, slips: Sequence[PythonSlip]) -> Meaning | None:
+    """Return why what a line publishes is no whole number, as far as the line and what is counted say so."""
+    texts = [n for n in calls_in_line(source, "str") if len(n.args) == 1]
+    if texts:
+        why = "the message takes a whole number, and `str(…)` makes a string of it"
+        return why, rewritten(source, (texts[0], texts[0].args[0]))
+    if sent is None or not sent.args:
+        return None
+    if (point := _decimal(sent.args[0])) is not None:
+        return point[0], rewritten(source, (sent.args[0], point[1]))
+    name = ast.unparse(sent.args[0])
+    if any((one.kind, one.name) == ("start-value", name) for one in slips):  # a counter is for its own topic
+        why = f"the message takes a whole number, and `{name}`, which begins as one, is none any more"
+        return why, f"write `int({name})` instead of `{name}`"
+    return None
+
+
 def unfit_value(found: Traceback, package: PackageFacts) -> Meaning | None:
     """Return why a message does not take the value that is published: a text for a number, a number for a text, or the
     publisher of another topic."""
@@ -404,13 +422,8 @@ def unfit_value(found: Traceback, package: PackageFacts) -> Meaning | None:
     slips = [s for s in package.slips if frame.file.endswith(f"/{s.file}")]
     types = {s.line: s.message for s in slips if s.kind == "publisher-type"}
     owners = {s.name: s for s in slips if s.kind == "publisher" and s.line in types}
-    texts = [n for n in calls_in_line(frame.source, "str") if len(n.args) == 1]
-    if texts and not wants_text:
-        why = f"the message takes a {kind}, and `str(…)` makes a string of it"
-        return why, rewritten(frame.source, (texts[0], texts[0].args[0]))
-    point = _decimal(sent.args[0]) if sent is not None and sent.args and not wants_text else None
-    if point is not None:
-        return point[0], rewritten(frame.source, (sent.args[0], point[1])) if sent is not None else ""
+    if not wants_text and (meant := _no_whole_number(frame.source, sent, slips)):
+        return meant
     here = owners.get(owner)
     bounds = _out_of_range(f"{found.message} {types[here.line].lower()}") if here is not None else None
     others = [

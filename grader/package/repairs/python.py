@@ -285,6 +285,24 @@ def turn_sign(folder: Path, file: str, side: str = "") -> Repair | None:
     return next(iter(files.repairs), None)
 
 
+def conversions(folder: Path, file: str, line: int, function: str, value: str) -> list[Repair]:
+    """Return the repairs that put `value` into `str(…)` or the like at the line where a run ended of its type, and on
+    the other lines of the script that join it to a text."""
+    files = Files(folder=folder.resolve())
+    name, right = rf"(?<![\w.]){re.escape(value)}(?![\w.(\[])", f"{function}({value})"
+    joined = re.compile(rf"[\"']\s*\+\s*{name}")
+    for number, code in enumerate((files.text(file) or "").split("\n"), start=1):
+        is_other = function == "str" and joined.search(code)
+        if (number == line or is_other) and len(re.findall(name, code)) == 1:
+            lines = (files.text(file) or "").split("\n")
+            lines[number - 1] = re.sub(name, lambda _: right, code)
+            message = f"line {number} of {file}: `{value}` is of another type than is needed here"
+            files.change(
+                "missing-call", file, "\n".join(lines), message, f"write `{right}` instead of `{value}`"
+            )
+    return list(files.repairs)
+
+
 def ros_clock(folder: Path, file: str) -> Repair | None:
     """Return the repair that measures time and waits by ROS's clock in a script that does so by the computer's; None
     where it does not."""
