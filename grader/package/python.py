@@ -75,6 +75,8 @@ _MESSAGES: tuple[tuple[str, ...], ...] = (
      "this line is indented, and no code is above it that it could belong to", "{0}"),
     (r"unexpected indent",
      "this line is indented further than the one above for no reason", "start it exactly below that one"),
+    (r"text behind the colon of line (\d+)",
+     "the text behind the `:` of line {0} is the whole block of that line", "write `#` in front of that text"),
     (r"block without its first line",
      "the line that begins this block (`if …:`) is missing above this line", "write it there, with what it asks"),
     (r"function without its first line",

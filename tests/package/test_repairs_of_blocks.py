@@ -116,6 +116,16 @@ CASES = {
     "except-that-is-missing": Case(
         {TALKER: SCRIPT + SERVED.replace("except rospy.ServiceException as e:\n", "")}, ["python-syntax"],
         "the line `except rospy.ServiceException as e:` is missing", after={TALKER: SERVED}),
+    "first-lines-behind-a-space": Case(
+        swapped(TALKER, ("import rospy", " import rospy"), ("from", " from"), ("def main", " def main"),
+                ("\nmain()", "\n main()")),
+        ["python-syntax"], "with no spaces", after={TALKER: "\nimport rospy\nfrom std_msgs"}),
+    "spaces-and-tabs-of-another-line": Case(
+        swapped(TALKER, ("        publisher.", "    \tpublisher."), ("        rate.sleep()", "  \t\trate.sleep()")),
+        ["python-syntax"], "start line 11 with the spaces and tabs of line 10", after={TALKER: "\n    \trate.sleep()"}),
+    "texts-in-place-of-comments": Case(
+        swapped(TALKER, ("import rospy", 'import rospy  """the library"""'), ("main():", 'main():  """the node"""')),
+        TWICE, 'write `import rospy  # """the library"""`', after={TALKER: 'def main():  # """the node"""\n    rospy'}),
     "import-further-in": Case(
         {TALKER: FROM_ROSPY}, ["python-syntax"], "line 2 of src/talker.py: this line is indented further",
         after={TALKER: "\nfrom rospy import init_node, spin"}),

@@ -120,6 +120,10 @@ def test_another_logger_is_left_alone(swaps: list[tuple[str, str]], tmp_path: Pa
 
 FROM_ROSPY = SPINS.replace("rospy.", "").replace("import rospy", "from rospy import Subscriber, init_node")
 LACKING = {
+    "dot-in-the-name-of-init-node": Case(
+        {TALKER: SPINS.replace("init_node", "init.node") + "    rospy.spin()\n"}, ["missing-call"],
+        "there is no rospy.init", after={TALKER: "\n    rospy.init_node('talker')\n"},
+    ),
     "spin-of-rospy-as-ros": Case(
         {TALKER: SPINS.replace("rospy.", "ros.").replace("import rospy", "import rospy as ros")},
         ["missing-call"], after={TALKER: "Int8, print)\n    ros.spin()\n"},

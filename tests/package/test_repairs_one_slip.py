@@ -252,6 +252,7 @@ SLIPS = {
         ("rate.sleep", "rate.Sleep", "`Sleep` is called `sleep`"),
         ("pub.publish(", "pub.publisher(", "`publisher` is called `publish`"),
         ("if __name__", "f __name__", "Python writes `if`, not `f`"),
+        ("if __name__ == '__main__':", "ifname == 'main':", "`__name__` has two `_` on each side"),
         ("if __name__", "if __nam__", "__nam__ is not defined"),
         ("'__main__'", "'__mai__'", "`__name__` is never '__mai__'"),
         ("__name__ ==", "bin ==", "`bin` is never '__main__'"),

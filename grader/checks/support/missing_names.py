@@ -521,7 +521,9 @@ def _begins_alike(name: str, wrong: str) -> bool:
 def _line_with(source: str, wrong: str, right: str) -> str:
     """Return the advice to write the line with another attribute, where it sets the wrong one, or has it once."""
     line, count = re.subn(rf"^([^=]*)\.{wrong}(?=\s*=(?!=))", rf"\g<1>.{right}", source)
-    if not count:
+    if (apart := f".{right.replace('_', '.')}") != f".{right}" and apart in source:  # `rospy.init.node`
+        line, count = source.replace(apart, f".{right}"), 1
+    elif not count:
         line, count = re.subn(rf"\.{wrong}\b", f".{right}", source)
     return f"write `{shown(line)}`" if count == 1 else f"write {right} instead of {wrong}"
 

@@ -16,6 +16,10 @@ DEPTHS = (2, 3, 4, 8)
 PAUSES = re.compile(r"\s*[\w.]+\.(sleep|spin)\(\s*[\w.]*\s*\)")
 
 
+TEXT_BEHIND = re.compile(
+    r"""^(\s*(?:def|class|if|elif|else|while|for|try|except|finally|with)\b.*:)\s+(""\"[^"]*""\"|'''[^']*''')\s*$"""
+)
+"""The first line of a block, with a text of three quotes behind its `:`."""
 MARKER = re.compile(r"(<{7}|={7}|>{7}|\|{7})(\s|$)")
 """Of git's, where two versions of a file were not merged."""
 
@@ -69,6 +73,22 @@ def lacks_def(lines, at):
     is_method = any(re.search(r"\bself\.", lines[n]) for n in body) and width_of(lines[above]) > 0
     apart = 1 if is_method else 2
     return own - width_of(lines[above]) in DEPTHS and len(body) > 1 and blank >= apart
+
+
+def with_head(lines, at):
+    """Yield the causes and the texts without what keeps Python from the line at index `at`: a text behind the `:` of
+    the line above, where a comment is meant, or the spaces before a script's first code, an import. As many are
+    left out of every line, or else of those that begin with just as many."""
+    above = next((n for n in range(at - 1, -1, -1) if lines[n].strip()), 0)
+    commented = TEXT_BEHIND.sub(r"\1  # \2", lines[above])
+    if commented != lines[above] and width_of(lines[at]) > width_of(lines[above]):
+        yield "token", "\n".join([*lines[:above], commented, *lines[above + 1 :]])
+    own = lines[at][: len(lines[at]) - len(lines[at].lstrip())]
+    if not own or not re.match(r"(import|from)\s", lines[at].strip()) or any(map(is_code, lines[:at])):
+        return
+    whole = all(line.startswith(own) for line in lines if is_code(line))
+    spared = [line.startswith(own) if whole else re.match(r"\s*", line).group() == own for line in lines]
+    yield "level", "\n".join(line[len(own) :] if spared[n] else line for n, line in enumerate(lines))
 
 
 def lacks_body(head, line):

@@ -23,7 +23,7 @@ import warnings
 
 # `-I` leaves this folder out, and a limited child does not begin in it.
 sys.path.append(os.path.dirname(os.path.abspath(__file__)))
-from script_blocks import MARKER, first_version, is_code, lacks_body, lacks_def, lacks_head
+from script_blocks import MARKER, TEXT_BEHIND, first_version, is_code, lacks_body, lacks_def, lacks_head
 from script_tree import (
     TEXT_LIMIT,
     slip,
@@ -460,6 +460,9 @@ def too_far_in(lines, line, *, alone):
     """Return what is missing above a line that is further in than it may be, `alone` where no code is above it."""
     if alone:
         return "indented at the top of the file: " + outdented(lines, line)
+    above = next((n for n in range(line - 2, -1, -1) if lines[n].strip()), 0)
+    if TEXT_BEHIND.match(lines[above]):
+        return "text behind the colon of line %d" % (above + 1)
     if lacks_head(lines, line - 1):
         return "block without its first line"
     return "function without its first line" if lacks_def(lines, line - 1) else ""

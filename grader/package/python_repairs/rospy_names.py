@@ -85,6 +85,7 @@ def with_attributes(text: str) -> Iterator[Step]:
     name in the script."""
     tree, lines = tree_of(text), text.split("\n")
     calls = {id(n.func): n for n in nodes_in(tree) if isinstance(n, ast.Call)}
+    around = {id(n.value): n for n in nodes_in(tree) if isinstance(n, ast.Attribute)}
     alone = {id(n.value) for n in nodes_in(tree) if isinstance(n, ast.Expr)}
     imported = [a for n in nodes_in(tree) if isinstance(n, ast.Import) for a in n.names]
     rospy = next((a.asname for a in imported if a.name == "rospy" and a.asname), "rospy")
@@ -103,6 +104,7 @@ def with_attributes(text: str) -> Iterator[Step]:
             continue
         call = calls.get(id(node))
         edit = _of_call(lines, node.attr, call, alone=id(call) in alone) if call is not None else None
+        edit = edit or _with_line(lines, node, around.get(id(node)))
         span = span_of(lines, node)
         meant = _near(node.attr, is_called=call is not None)
         if edit is None and meant and span is not None:
@@ -115,6 +117,19 @@ def with_attributes(text: str) -> Iterator[Step]:
             yield step
             yield from with_attributes(step["text"])
             return
+
+
+def _with_line(
+    lines: list[str], first: ast.Attribute, whole: ast.Attribute | None
+) -> tuple[int, int, int, str] | None:
+    """Return the edit of `rospy.init.node` to `rospy.init_node`; None of any other name."""
+    span = span_of(lines, whole) if whole is not None else None
+    if whole is None or span is None or f"{first.attr}_{whole.attr}" not in ROSPY:
+        return None
+    line, start, end = span
+    begin = end - len(f"{first.attr}.{whole.attr}")
+    is_plain = begin > start and lines[line][begin:end] == f"{first.attr}.{whole.attr}"
+    return (line, begin, end, f"{first.attr}_{whole.attr}") if is_plain else None
 
 
 def _is_logger(node: ast.expr, owners: set[str]) -> bool:

@@ -25,7 +25,7 @@ from grader.line_slips.python import (
     without_texts,
 )
 from grader.line_slips.python_habits import DELETE_LINE
-from grader.package.lint.script_blocks import blocks_of, first_version, lacks_body, lacks_head
+from grader.package.lint.script_blocks import blocks_of, first_version, lacks_body, lacks_head, with_head
 from grader.package.lint.script_spellings import without_types
 from grader.package.python_repairs.lost_heads import lost_head_at
 from grader.package.python_repairs.python2 import as_python3
@@ -193,9 +193,8 @@ def _candidates(text: str, error: Error) -> Iterator[tuple[str, str]]:
     at = error["line"] - 1
     if not 0 <= at < len(lines):
         return
-    if ("future" in error["message"] and FUTURE.fullmatch(lines[at])) or reason_of_line(
-        lines[at]
-    ).fix == DELETE_LINE:
+    is_future = "future" in error["message"] and FUTURE.fullmatch(lines[at])
+    if is_future or reason_of_line(lines[at]).fix == DELETE_LINE:
         yield "token", _without_line(lines, at)
     yield "token", with_line(lines, at, ROSPY_COMMA.sub("rospy.", lines[at]))
     yield from _with_body_uncommented(lines, error["message"])
@@ -233,6 +232,7 @@ def _without_line(lines: list[str], at: int) -> str:
 def _in_their_blocks(lines: list[str], at: int, message: str) -> Iterator[tuple[str, str]]:
     """Yield the causes and the texts with a line that its block lacks, or with lines in the block that they belong
     to."""
+    yield from with_head(lines, at)
     if "expected an indented block" in message and at and lines[at].strip() == lines[at - 1].strip():
         yield "twice", "\n".join([*lines[:at], *lines[at + 1 :]])
     if "expected an indented block" in message and at and OUTERMOST.match(lines[at - 1].strip()):

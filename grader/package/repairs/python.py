@@ -376,6 +376,11 @@ def _change(files: Files, file: str, cause: Cause, steps: list[_Step]) -> None:
     files.change(kind, file, steps[-1].text, message, fix, asks_input=asks)
 
 
+def _blanks_of(text: str, number: int) -> str:
+    line = text.split("\n")[number - 1]
+    return line[: len(line) - len(line.lstrip())]
+
+
 def _required_indentation(before: str, after: str, first: str) -> str:
     """How lines that are indented otherwise have to begin, so that the file parses; `first` goes before it."""
     pairs = enumerate(zip(before.split("\n"), after.split("\n"), strict=False), start=1)
@@ -385,7 +390,13 @@ def _required_indentation(before: str, after: str, first: str) -> str:
     for number, new in changed:
         count = len(new) - len(new.lstrip())
         kind = "tab" if set(new[:count]) == {"\t"} else "space"
-        some = lines.setdefault(plural(count, kind) if count else "no spaces", [])
+        begin = plural(count, kind) if count else "no spaces"
+        if len(set(new[:count])) > 1:
+            tabs = new[:count].count("\t")
+            like = [n for n in range(number - 1, 0, -1) if _blanks_of(after, n) == new[:count]]
+            mixed = f"{plural(count - tabs, 'space')} and {plural(tabs, 'tab')}"
+            begin = f"the spaces and tabs of line {like[0]}" if like else mixed
+        some = lines.setdefault(begin, [])
         between = range(some[-1] + 1, number) if some else range(0)
         some += [*(between if empty.issuperset(between) else ()), number]
     named = [f"{on_lines(some)} with {begin}" for begin, some in lines.items()]
