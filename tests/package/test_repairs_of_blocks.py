@@ -120,6 +120,9 @@ CASES = {
         swapped(TALKER, ("import rospy", " import rospy"), ("from", " from"), ("def main", " def main"),
                 ("\nmain()", "\n main()")),
         ["python-syntax"], "with no spaces", after={TALKER: "\nimport rospy\nfrom std_msgs"}),
+    "all-lines-behind-a-tab": Case(
+        {TALKER: "#!/usr/bin/env python3\n" + "".join(f"\t{line}\n" for line in SCRIPT.split("\n")[1:-1])},
+        ["python-syntax"], after={TALKER: "\nimport rospy\nfrom std_msgs.msg import Int8\n\ndef main():\n    rospy"}),
     "spaces-and-tabs-of-another-line": Case(
         swapped(TALKER, ("        publisher.", "    \tpublisher."), ("        rate.sleep()", "  \t\trate.sleep()")),
         ["python-syntax"], "start line 11 with the spaces and tabs of line 10", after={TALKER: "\n    \trate.sleep()"}),

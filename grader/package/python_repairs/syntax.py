@@ -184,13 +184,13 @@ def _only_tabs(text: str, error: Error) -> bool:
 
 def _candidates(text: str, error: Error) -> Iterator[tuple[str, str]]:
     yield "merged", first_version(text)
+    lines, at = text.split("\n"), error["line"] - 1
+    yield from with_head(lines, at) if 0 <= at < len(lines) else ()
     if error["kind"] in {"TabError", "IndentationError"}:
         wide, narrow = _all_expanded(text, 8), _all_expanded(text, 4)
         yield "tabs", narrow if blocks_of(narrow) == blocks_of(wide) else wide
         yield "tabs", _like_the_line_before(text, error["line"])
         yield "tabs", narrow
-    lines = text.split("\n")
-    at = error["line"] - 1
     if not 0 <= at < len(lines):
         return
     is_future = "future" in error["message"] and FUTURE.fullmatch(lines[at])
@@ -232,7 +232,6 @@ def _without_line(lines: list[str], at: int) -> str:
 def _in_their_blocks(lines: list[str], at: int, message: str) -> Iterator[tuple[str, str]]:
     """Yield the causes and the texts with a line that its block lacks, or with lines in the block that they belong
     to."""
-    yield from with_head(lines, at)
     if "expected an indented block" in message and at and lines[at].strip() == lines[at - 1].strip():
         yield "twice", "\n".join([*lines[:at], *lines[at + 1 :]])
     if "expected an indented block" in message and at and OUTERMOST.match(lines[at - 1].strip()):
