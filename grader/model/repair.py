@@ -191,9 +191,14 @@ def indent_of(line: str) -> str:
 
 def advice_on(repairs: Iterable[Repair]) -> list[str]:
     """Return the advice for each of the repairs, as one for those that follow each other on one line. Those that write
-    the same line are told as one, by what it was and will be."""
+    the same line are told as one, by what it was and will be, and a line that is added as it will be in the end."""
     joined: list[Repair] = []
     for repair in repairs:
+        added = next((at for at, one in enumerate(joined) if _is_of_added(one, repair)), None)
+        if added is not None:
+            after = joined[added].after.removesuffix(repair.before) + repair.after
+            joined[added] = joined[added].model_copy(update={"after": after, "fix": repair.after})
+            continue
         earlier = next((at for at, one in enumerate(joined) if _is_rewritten(one, repair)), None)
         if earlier is not None:
             before = joined[earlier].before
@@ -210,6 +215,12 @@ def advice_on(repairs: Iterable[Repair]) -> list[str]:
 
 def _is_rewritten(one: Repair, later: Repair) -> bool:
     return (one.file, one.line, one.after) == (later.file, later.line, later.before)
+
+
+def _is_of_added(one: Repair, later: Repair) -> bool:
+    """Return whether the later repair writes one line otherwise that the other one adds."""
+    adds = one.fix == later.before and one.after.endswith(f"\n{later.before}")
+    return one.file == later.file and adds and "\n" not in later.before + later.after
 
 
 def _indentation(line: str) -> str:

@@ -258,6 +258,17 @@ def test_a_line_that_is_repaired_twice_is_told_once() -> None:
     known = {"kind": "missing-call", "file": "a.py", "message": "wrong"}
     repairs = [Repair(**known, line=n, before=old, after=new, fix=new) for n, old, new in lines]
     assert advice_on(repairs) == ["a.py line 2: write `c`", "a.py line 3: write `y`"]
+    call = "find_package(catkin REQUIRED COMPONENTS {})"
+    added = [
+        (1, "project(a)", f"project(a)\n{call.format('rospy')}"),
+        (1, call.format("rospy"), call.format("roscpp rospy")),
+    ]
+    of_build = {**known, "kind": "build-line", "file": "CMakeLists.txt"}
+    repairs = [
+        Repair(**of_build, line=n, before=old, after=new, fix=new.split("\n")[-1]) for n, old, new in added
+    ]
+    (told,) = advice_on(repairs)
+    assert told.endswith(f"`{call.format('roscpp rospy')}`")
 
 
 def test_every_kind_has_a_share_and_words() -> None:
