@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from typing import Annotated
 
@@ -57,7 +58,7 @@ from grader.model.package import PackageFacts
 from grader.model.python_slip import PythonSlip, SlipKind
 from grader.model.record import Record
 from grader.model.verdict import Verdict, failed, failed_or_blocked, grade_again, passed
-from grader.wording import join_words, plural, significant
+from grader.wording import is_one_edit, join_words, plural, significant
 
 UNCALLED: tuple[SlipKind, ...] = ("never-reached", "never-called")
 """Why a line of a script is never run; a function that nothing calls may also be a spare one."""
@@ -126,6 +127,14 @@ def hears(package: PackageFacts, run: Run, params: HearsParams) -> Verdict:
     return verdict.about(expected=expected, measured=verdict.measured or count, citations=(sent,))
 
 
+def _misspelt_word(said: str, template: str) -> tuple[str, str] | None:
+    """Return the only word of the template that a line has not, and what it has with one letter otherwise."""
+    asked, words = (re.findall(r"[^\W\d_]+", text) for text in (template.replace(VALUE, ""), said))
+    absent = [word for word in asked if word.casefold() not in map(str.casefold, words)]
+    near = [(a, b) for a in absent for b in words if len(a) > 2 and is_one_edit(a.casefold(), b.casefold())]
+    return near[0] if len(absent) == len(near) == 1 else None
+
+
 def _other_words(
     probes: Sequence[Probe], missing: Sequence[Probe], lines: Sequence[Line], params: HearsParams
 ) -> Verdict | None:
@@ -149,6 +158,8 @@ def _other_words(
         hint = f"print '{wanted}', with ' ' in place of {mark!r} between the words and the message"
         if place := unfilled(mark):
             hint = f"print '{wanted}': {place}{python_or_cpp(', in place of the + or the comma there', '')}"
+    elif said and (misspelt := _misspelt_word(said[0], params.template)):
+        hint = f"print '{wanted}': {misspelt[0]}, not {misspelt[1]}"
     # What is printed right counts in full, the rest by the share of other words.
     share = 1 - (1 - OTHER_WORDS_SHARE) * len(missing) / len(probes)
     all_of = plural(len(probes), "message")
