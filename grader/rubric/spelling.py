@@ -172,11 +172,12 @@ def _in_namespace(path: KeyPath, text: str, names: list[tuple[KeyPath, str, str]
 
 
 def _count(word: str, name: str, texts: list[tuple[KeyPath, str]]) -> int:
-    """Return how often a word is there. `steps` is a word of prose too, `/steps` is not."""
+    """Return how often a word is there. `steps` is a word of prose too, `/steps` and `set_steps` are not."""
     end = rf"{re.escape(word)}(?!\w)"
     whole = re.compile(rf"(?<!\w){end}")
     # With its slash, or in backticks: the bare word in a sentence is no mention of the topic.
-    in_prose = re.compile(rf"[/~`_]{end}") if name.startswith("/") and not word.startswith("/") else whole
+    is_plain = name.startswith("/") and not word.startswith("/") and word.isalpha()
+    in_prose = re.compile(rf"[/~`_]{end}") if is_plain else whole
     there = ((whole if PROSE.isdisjoint(at) else in_prose, one) for at, one in texts if word in one)
     return sum(len(pattern.findall(one)) for pattern, one in there)
 

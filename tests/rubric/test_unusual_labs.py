@@ -97,6 +97,9 @@ TURNS = """\
         ("a talker and a listener on /said", PAIR,
          ["check: node-lives, with: {process: all, min_s: 5, names: [talker]}, scenario: pair",
           "check: launch-connects, with: {launch: pair.launch, topic: /said}, scenario: pair"]),
+        # names of nodes that are no words of prose
+        ("pair.launch starts s_server and s_talk", PAIR,
+         ["check: launch-runs, scenario: pair, with: {launch: pair.launch, nodes: {/s_server: lab1, /s_talk: lab1}}"]),
         # a map that grows has two sizes
         ("a nav_msgs/OccupancyGrid on /map, of 2 by 1 cells and then of 2 by 2", GROWS,
          ["check: field-equals, with: {topic: /map, field: info.width, value: 2}, scenario: grows",
