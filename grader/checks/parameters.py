@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import combinations
+from pathlib import PurePosixPath
 from typing import Annotated, Any
 
 from grader.checks.registry import Refers, check
@@ -428,6 +429,12 @@ def _judge_value(package: PackageFacts, build: Run, got: object, params: ParamVa
     places = _given_at(package, build, absolute_name(params.name))
     if len(places) == 1:
         hint = f"{places[0].file}, line {places[0].line}: {hint}"
+    loads = [one for file in package.launch_files for one in file.loads if one.source]
+    loads = [one for one in loads if absolute_name(params.name).startswith(one.namespace)]
+    if len(places) != 1 and len(loads) == 1:
+        source = PurePosixPath(loads[0].source or "").name
+        hint = f"see whether it is right that line {loads[0].line} of {loads[0].file} loads {source}: {hint}"
+        places = (loads[0].place,)
     message = shown(f"{params.name} is {join_words(wrong)}")
     return failed(message, hint=hint, citations=places[:1] if len(places) == 1 else ())
 
@@ -471,6 +478,13 @@ def _not_there(package: PackageFacts, run: Run, names: Iterable[str], params: Pa
         ]
         if outside and f"/{key}" in near:
             hint = f"move the <param> on line {outside[0].line} of {outside[0].file} into the <node> {node.strip('/')}"
+        for load in (one for file in package.launch_files for one in file.loads):
+            rest = near[0].removeprefix(load.namespace)
+            above = params.name.removesuffix(f"/{rest}")
+            if rest != near[0] and above != params.name and "/" in rest:
+                space = load.namespace.rstrip("/") or "/"
+                goes = f"line {load.line} of {load.file} loads it into the namespace {space}"
+                hint = f"{goes}, and it belongs into {above}: see which <group ns=…> the line is in"
         return failed(message, hint=hint)
     if absent := no_node(package, run, f"there is no parameter {params.name}"):
         return absent

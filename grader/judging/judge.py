@@ -16,6 +16,7 @@ from typing import Any, NamedTuple, cast
 from grader.checks import CHECKS, Check
 from grader.checks.build import explain_by_build
 from grader.checks.registry import NotRecorded
+from grader.checks.support.absent_parameters import explain_by_absent_parameter
 from grader.checks.support.exit_causes import explain_by_exception
 from grader.checks.support.launch import explain_by_refused_launch
 from grader.checks.support.launch_connections import explain_by_late_remap
@@ -318,6 +319,7 @@ EXPLANATIONS = (
     explain_by_lacking_program,
     explain_by_refused_launch,
     explain_by_late_remap,
+    explain_by_absent_parameter,
     explain_by_exception,
     explain_by_unheard_topic,
     explain_by_overwritten_parameter,

@@ -476,14 +476,15 @@ class Traceback(NamedTuple):
 
 
 def tracebacks(lines: Sequence[str]) -> tuple[Traceback, ...]:
-    """Return every traceback, also the bare `File …` form of a syntax error. One that was cut short is left out."""
+    """Return every traceback, also the bare `File …` of a syntax error, and none that was cut short."""
     found: list[Traceback] = []
     frames: list[Frame] = []
     first: int | None = None
-    bare = _followed_by_syntax_error(lines)
+    bare, is_mixed = _followed_by_syntax_error(lines), False
     for index, line in enumerate(lines):
         frame = _FRAME.match(line)
         if HEADING in line:
+            is_mixed |= first is not None
             first, frames = index, []
         elif found and line == HANDLING:
             found[-1] = found[-1]._replace(is_handled=True)
@@ -493,15 +494,29 @@ def tracebacks(lines: Sequence[str]) -> tuple[Traceback, ...]:
         elif frames and not frames[-1].source and line.startswith("    "):
             frames[-1] = frames[-1]._replace(source=line.strip())
         elif frames and frames[-1].source and not frames[-1].marked and (carets := _CARETS.fullmatch(line)):
-            # Python indents source and carets by four.
-            frames[-1] = frames[-1]._replace(marked=(carets.start(1) - 4, carets.end(1) - 4))
+            place = (carets.start(1) - 4, carets.end(1) - 4)  # indented by four, as the source is
+            frames[-1] = frames[-1]._replace(marked=place)
         elif first is not None and line and not line[0].isspace():
             last = _LAST.match(line)
             if last:
                 kind = last[1].rpartition(".")[2]
                 found.append(Traceback(kind, (last[2] or "").strip(), tuple(frames), first, index))
             first = None
-    return tuple(found)
+    return (_mixed(lines) if is_mixed else ()) or tuple(found)
+
+
+def _mixed(lines: Sequence[str]) -> tuple[Traceback, ...]:
+    """Return the traceback that several processes printed at once, with their lines mixed, if it is the same."""
+    last = {m.groups(): n for n, m in enumerate(map(_LAST.match, lines)) if m and m[1].endswith("Error")}
+    starts = [n for n, line in enumerate(lines) if HEADING in line]
+    frames, at = dict[tuple[str, int], Frame](), ("", 0)
+    for line in lines[starts[0] :] if len(starts) > 1 == len(last) else ():
+        if frame := _FRAME.match(f"  {line.lstrip()}"):
+            frames.setdefault(at := (frame[1], int(frame[2])), Frame(*at))
+        elif at in frames and re.search(r"\w", line):
+            frames[at] = frames[at]._replace(source=frames[at].source or line.strip())
+    about = [(k.rpartition(".")[2], text or "", n) for (k, text), n in last.items() if frames]
+    return tuple(Traceback(kind, text, (*frames.values(),), starts[0], n) for kind, text, n in about)
 
 
 def unpack_traceback(line: str) -> list[str]:
@@ -585,7 +600,7 @@ def unreached_except(
     lost: Callable[..., Verdict],
 ) -> Verdict | None:
     """Return the loss where an `except` prints the words, and what is above it raised nothing; `lost` makes it."""
-    # a script that still waits for what it calls may yet catch something
+    # what a script still waits for may yet be caught
     own = [s for s in package.slips if s.file == one.start.script and one.ended_early]
     said = [s for s in own if s.kind == "prints" and any(found_in(Line(0, filled(s))))]
     caught = {s.line + 1: s for s in own if s.kind == "catches"}

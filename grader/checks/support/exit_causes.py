@@ -178,9 +178,10 @@ def _find_cause(life: Life, run: Run, package: PackageFacts) -> Ending:
     found = process_tracebacks(run, life.name)
     code = life.end.exit_code if life.end else None
     # A script that catches an exception and prints it may still come to a good end.
-    if found and code != 0:
-        return explain_traceback(found[-1], package)
     printed = [line.line for _, line in run.lines(life.name) if line.line.strip()]
+    # roslaunch itself comes to a good end when its last node has died.
+    if found and (code != 0 or any("have died, roslaunch" in line for line in printed)):
+        return explain_traceback(found[-1], package)
     # A signal of the grader's is no crash.
     if life.end is not None and life.end.signal is not None and life.end.stopped_by is None:
         ended = f"{signal_name(life.end.signal)} ended it"
@@ -189,7 +190,7 @@ def _find_cause(life: Life, run: Run, package: PackageFacts) -> Ending:
     if (offline := _offline(code, printed)) or code == 0:
         return offline or _not_run(life, run, package) or _ran_to_the_end(printed, package)
     # roslaunch goes on printing after it has said why.
-    exceptions = [line for line in printed if line.startswith("RLException: ")]
+    exceptions = [line for line in printed if re.match(r"(?:\x1b\[\d*m)?RLException: ", line)]
     last = next(iter(exceptions or printed[::-1]), "")
     words = f"; its last output: {shown(last)}" if last else ""
     # Remappings are ROS's, and no arguments of the program.

@@ -351,7 +351,7 @@ def one_for_another(values: Sequence[object], wanted: object) -> str:
         return ""
     ((other, right),) = pairs
     still = value_text(other) in map(value_text, wanted)
-    return "" if still else f"write {value_text(right)} in place of {value_text(other)} in the list"
+    return "" if still else f"where the list has {value_text(other)}, it has to have {value_text(right)}"
 
 
 def turned_wrong(found: Sequence[Reading], wanted: object) -> int:

@@ -573,6 +573,9 @@ def right_remap(
     off = next((one for one in node.left_out if f"{node.namespace}{one.tag.lstrip('/')}" in published), None)
     if off is not None:
         return off, f"remove {off.value} from line {off.line}, or give its <arg> the other default"
+    own = topic.removeprefix(node.namespace)
+    if f"/{own}" in names and all(second != f"/{own}" for _, second in node.remaps):
+        return node, without_slash(node, own)
     if not node.remaps:
         name = published[0].removeprefix(node.namespace) if len(published) == 1 else "…"
         tag = f'<remap from="{name}" to="{topic.removeprefix(node.namespace)}"/>'
@@ -587,7 +590,10 @@ def right_remap(
         return at, f'on line {at.line} of {at.file}, write {at.value if given else "to"}="{to}"'
     if not names[0].startswith(node.namespace):  # its `to` begins with a slash: `from` is right
         name = next((first for first, second in node.remaps if second == names[0]), name)
-    return lines[0], (
-        f'write `<remap from="{name}" to="{to}"/>` there: `from` is the name in the script, and a slash in front of a '
-        "name takes it out of its namespace"
-    )
+    why = "`from` is the name in the script, and a slash in front of a name takes it out of its namespace"
+    return lines[0], f'write `<remap from="{name}" to="{to}"/>` there: {why}'
+
+
+def without_slash(node: LaunchNode, name: str) -> str:
+    """Return what to write in a script that gives a name of its namespace a slash in front."""
+    return f"in {node.type}, write '{name}', not '/{name}': a slash takes the name out of its namespace"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import posixpath
 from collections.abc import Callable, Collection, Iterator
 from pathlib import PurePosixPath
 from typing import Literal
@@ -9,7 +10,7 @@ from typing import Literal
 from grader.checks.registry import Check
 from grader.checks.support.exit_causes import explain_end, explain_error
 from grader.checks.support.frames import unknown_frame
-from grader.checks.support.launch_slips import own_script, right_remap
+from grader.checks.support.launch_slips import own_script, right_remap, without_slash
 from grader.checks.support.processes import (
     NO_SCRIPT_HINT,
     copied_topic,
@@ -442,11 +443,35 @@ def unheard_programs(run: Run) -> dict[str, tuple[str, ...]]:
 
 def _remap_to(package: PackageFacts, run: Run, topic: str, heard: str) -> str:
     """Return how a launch file's node, which hears a topic of its namespace, is to hear another one; "" for others."""
+    for late in (one for file in package.launch_files for one in file.late_remaps):
+        ends = [posixpath.join(late.namespace, name) for name in (late.value, late.to)]
+        if ends == [heard, topic]:
+            has_none = "it has no effect on the nodes above it"
+            return f"move the <remap> from line {late.line} of {late.file} to above line {late.above}: {has_none}"
     nodes = {node.full_name: node for file in package.launch_files for node in file.brings}
-    node = next((nodes[name] for name in nodes_on(run, heard, "subscribers") if name in nodes), None)
-    if node is None or node.namespace == "/" or not heard.startswith(node.namespace):
+    there = [nodes[name] for name in nodes_on(run, heard, "subscribers") if name in nodes]
+    for node in there:  # one of whose namespace the name has been taken out
+        if node.namespace != "/" and topic == f"{node.namespace.rstrip('/')}{heard}":
+            froms = {first.strip("/") for first, second in node.remaps if second == heard}
+            lines = [one for one in node.renaming if one.tag == "remap" and one.value.strip("/") in froms]
+            to = next(iter(lines[::-1]), None)
+            taken = "it takes the name out of its namespace"
+            at = (
+                to
+                and f"on line {to.line} of {to.file}, remove the slash in front of the name in to=…: {taken}"
+            )
+            return at or without_slash(node, heard.strip("/"))
+    if not there or there[0].namespace == "/" or not heard.startswith(there[0].namespace):
         return ""
+    node = there[0]
     name = heard.removeprefix(node.namespace)
+    spaces, space = [one for one in node.renaming if one.tag != "remap"], topic.removesuffix(name).strip("/")
+    if (
+        topic == f"/{space}/{name}"
+        and len(spaces) == 1
+        and spaces[0].value.strip("/") == node.namespace.strip("/")
+    ):
+        return f'on line {spaces[0].line} of {spaces[0].file}, write ns="{space}", not ns="{spaces[0].value}"'
     right = f'<remap from="{name}" to="{topic}"/>'
     wrong = next((one for one in node.renaming if one.tag == "remap" and one.value == topic), None)
     if wrong is not None:
