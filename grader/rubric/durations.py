@@ -261,8 +261,9 @@ def answer_faults(about: WrittenCriterion) -> Iterator[Fault]:
             yield (*about.at, key), waits
 
 
-def stretch_faults(about: WrittenCriterion) -> Iterator[Fault]:
-    """Yield what is judged while something is so, or after it, where the run's steps give it too little time."""
+def stretch_faults(about: WrittenCriterion, watched_s: float = 0.0) -> Iterator[Fault]:
+    """Yield what is judged while something is so, or after it, where the run's steps give it too little time. The run
+    goes on after them for as long as another criterion watches its nodes: `watched_s` at most."""
     given, at = about.given, (*about.at, "within_s")
     within_s, window_s = (
         given.get(key, RateParams.model_fields[key].default) for key in ("within_s", "min_window_s")
@@ -271,7 +272,7 @@ def stretch_faults(about: WrittenCriterion) -> Iterator[Fault]:
         cause = Condition.model_validate(given.get("cause")) if about.check in {"rate", "reacts"} else None
     except ValidationError:  # said elsewhere
         return
-    lasting = None if cause is None else _lasting_s(cause, about.scenario)
+    lasting = None if cause is None else _lasting_s(cause, about.scenario, watched_s)
     if cause is None or lasting is None or not is_number(window_s) or not is_number(within_s):
         return
     kept_s, left_s = (significant(one) for one in lasting)
@@ -287,7 +288,7 @@ def stretch_faults(about: WrittenCriterion) -> Iterator[Fault]:
         yield at, f"{ends} {within_s:g} s: let a last step wait for longer"
 
 
-def _lasting_s(cause: Condition, scenario: dict[str, Any]) -> tuple[float, float] | None:
+def _lasting_s(cause: Condition, scenario: dict[str, Any], watched_s: float) -> tuple[float, float] | None:
     """Return how long the steps of a run keep a condition up at most, and how long the run lasts from the first time
     that it begins; None where they do not send it, or nobody knows."""
     steps, warp, first_s = _read_steps(scenario), warp_of(scenario), until_of(scenario, "first_message_s")
@@ -312,7 +313,7 @@ def _lasting_s(cause: Condition, scenario: dict[str, Any]) -> tuple[float, float
         now_s += step.lasts_s + (warp * _waits_s(step, first_s) if is_waiting else 0.0)
     if first is None or (after_s := _after_steps_s(scenario)) is None:
         return None
-    end_s = now_s + after_s
+    end_s = now_s + max(after_s, watched_s * warp)
     return max(longest_s, end_s - began_s if began_s is not None else 0.0), end_s - first
 
 

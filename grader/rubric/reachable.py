@@ -55,6 +55,8 @@ WRAPS = {"minimum": 0, "maximum": 127, "wraps": 2}
 """Of `counter-wrap`, with their defaults."""
 STEPS = 10
 """The default of `min_steps` of `counter-step`."""
+LIVES_S = 5.0
+"""The default of `min_s` of `node-lives`."""
 MANY = 3
 """A recording may hold so many times the messages that a scenario waits for, as it is closed a little later."""
 FEWEST = 2
@@ -86,7 +88,7 @@ def reach_faults(rubric: WrittenRubric, checks: Mapping[str, Check]) -> Iterator
         yield from answer_faults(about)
         if about.run not in watched:
             yield from early_faults(about)
-        yield from stretch_faults(about)
+        yield from stretch_faults(about, _watched_s(about, others))
         yield from room_faults(about, longest_s(about.scenario))
         yield from _never_sent(about, others)
         if about.check in {"ends-at", "path", "stays-within"}:
@@ -94,6 +96,12 @@ def reach_faults(rubric: WrittenRubric, checks: Mapping[str, Check]) -> Iterator
     yield from _contradictions(criteria)
     yield from _other_effects(criteria)
     yield from _other_ends(criteria)
+
+
+def _watched_s(about: WrittenCriterion, others: Sequence[WrittenCriterion]) -> float:
+    """Return how long the criteria on a run ask that its nodes are watched, where they do."""
+    lives = [one.given.get("min_s", LIVES_S) for one in others if one.check == "node-lives"]
+    return max((one for one in lives if is_number(one)), default=0.0) if about.check == "reacts" else 0.0
 
 
 def _too_many(rubric: WrittenRubric, checks: Mapping[str, Check]) -> Iterator[Fault]:

@@ -43,6 +43,10 @@ CLIENT = """\
     serves: [{service: /get, type: rospy_tutorials/AddTwoInts, answer: {sum: 8}}]
     until: {ended: [client]}"""
 
+AFTER_THREE = (
+    "check: reacts, scenario: turns, requires: [c0],"
+    " with: {cause: {topic: /level, field: data, min: 3}, effect: {topic: /clean}, within_s: 3}"
+)
 TELLS = """\
   tells:
     title: Tells
@@ -111,6 +115,10 @@ TURNS = """\
         ("asks /get and prints twice the sum", CLIENT,
          ["check: prints, with: {process: client, text: '{number}', numbers: [8]}, scenario: four",
           "check: prints, with: {process: client, text: '{number}', numbers: [16]}, scenario: eight"]),
+        # the run goes on after its steps for as long as the node is watched
+        ("clean answers 3 on /level, a std_msgs/Float64, with one on /clean; NaN is left out", TURNS,
+         ["check: node-lives, with: {process: clean, min_s: 3}, scenario: turns",
+          AFTER_THREE]),
         # an action's feedback sets off messages too
         ("tells each feedback of /count on /told, and each order on /go", TELLS,
          ["check: field-equals, with: {topic: /told, field: data, values: [1, 2]}, scenario: tells"]),
