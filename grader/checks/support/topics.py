@@ -394,6 +394,8 @@ def unheard(run: Run, package: PackageFacts | None = None) -> Verdict | None:
     if not missed or not run.student_nodes() or (near is None and len(missed) < len(topics)):
         return None
     topic, found = near or (missed[0], offered.get(missed[0], others))
+    space = topic.rpartition("/")[0]
+    found = tuple(sorted(found, key=lambda one: one.rpartition("/")[0] != space))  # its own namespace first
     if refused := refused_type(run, topic, package):
         return refused
     if topic in TF_TOPICS:
