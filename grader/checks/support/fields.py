@@ -338,6 +338,13 @@ def made_of(found: Sequence[Reading], channels: Iterable[Channel], wanted: _Want
     return None
 
 
+def _are_the_same(got: Sequence[object], wanted: Sequence[object]) -> bool:
+    """Return whether two lists have the same different numbers, a float's rounding aside."""
+    ours, theirs = (sorted(one for one in each if is_number(one)) for each in (got, wanted))
+    is_whole = len(ours) == len(got) == len(theirs) > 1 and theirs[0] != theirs[-1]
+    return is_whole and all(math.isclose(a, b, rel_tol=ROUNDING) for a, b in zip(ours, theirs, strict=True))
+
+
 def one_for_another(values: Sequence[object], wanted: object) -> str:
     """Return what to write where a list is empty, or all its wrong items have one number in place of another one; ""
     elsewhere."""
@@ -346,6 +353,8 @@ def one_for_another(values: Sequence[object], wanted: object) -> str:
         return "fill the list above the line that publishes it: it is still empty there"
     if not isinstance(got, list | tuple) or not isinstance(wanted, list | tuple) or len(got) != len(wanted):
         return ""
+    if _are_the_same(got, wanted):
+        return f"the values are right and in another order: it has to be {value_text(wanted)}"
     pairs = {(a, b) for a, b in zip(got, wanted, strict=True) if a != b and is_number(a) and is_number(b)}
     if len(pairs) != 1 or sorted(map(str, got)) == sorted(map(str, wanted)):
         return ""
