@@ -13,7 +13,7 @@ from pydantic import Field, model_validator
 
 from grader.checks.registry import Refers, check
 from grader.checks.support.clocks import NEVER_LATE_S, excused, no_clock, run_seconds, why_late
-from grader.checks.support.conditions import Condition, is_called, true_spans
+from grader.checks.support.conditions import Condition, is_called, said_of_calls, true_spans
 from grader.checks.support.fields import (
     Reading,
     changing_beside,
@@ -156,11 +156,12 @@ def reacts(package: PackageFacts, run: Run, params: ReactsParams) -> Verdict:
     )
     verdict = _with_ranges(package, run, params, causes, verdict)
     span = (answers[0].at_ns, answers[-1].at_ns) if answers else (None, None)
-    return verdict.about(
+    verdict = verdict.about(
         expected=params.expected,
         measured=verdict.measured or _measured(answers),
         citations=(cite(run, _shown_on(run, params), *span), cite(run, params.effect.topic)),
     )
+    return said_of_calls(run, params.cause, verdict)
 
 
 def _measured(answers: list[Answer]) -> str:
@@ -361,7 +362,8 @@ def _judge_silence(package: PackageFacts, run: Run, params: ReactsParams) -> Ver
         verdict = _with_ranges(package, run, params, causes, verdict)
     expected = f"{params.effect.absence} {_silent_words(params)}"
     cited = (cite(run, params.effect.topic if effects else "/grader/graph"),)
-    return verdict.about(expected=expected, measured=verdict.measured or "none", citations=cited)
+    verdict = verdict.about(expected=expected, measured=verdict.measured or "none", citations=cited)
+    return said_of_calls(run, params.cause, verdict)
 
 
 def _kept_silent(own: Sequence[Channel], params: ReactsParams) -> Verdict:
@@ -565,6 +567,8 @@ def _judge_unanswered(
 ) -> Verdict | None:
     hint = f"each time that {params.trigger.words} comes, publish {params.effect.words}"
     hint = f"{hint}, in the callback of {params.trigger.topic}"
+    if is_called(run, params.trigger.topic):
+        hint = f"look at what the callback of {params.trigger.topic} sets: {params.effect.words} has to follow a call"
     if params.of != "student":
         hint = f"look at what your node publishes once {params.trigger.words} comes: {params.effect.words} comes of it"
     if not answers and (unsent := misfit(run, params.trigger.topic)):

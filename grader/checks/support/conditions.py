@@ -25,6 +25,7 @@ from grader.checks.support.services import exchanges
 from grader.evidence.events import NOT_OFFERED
 from grader.evidence.run import Channel, Run
 from grader.model.record import Record
+from grader.model.verdict import Verdict
 from grader.wording import significant
 
 
@@ -129,6 +130,15 @@ def is_called(run: Run, name: str) -> bool:
     sent = any(c.topic == name and c.by_grader for c in run.channels)
     called = (e for _, e in run.actors if e.topic == name and (e.action == "call" or e.detail == NOT_OFFERED))
     return not sent and any(called)
+
+
+def said_of_calls(run: Run, cause: Condition | None, verdict: Verdict) -> Verdict:
+    """Return the verdict with calls where messages are said, if the cause is a service."""
+    if cause is None or cause.field is not None or not is_called(run, cause.topic):
+        return verdict
+    texts = {key: getattr(verdict, key) for key in ("message", "hint", "expected")}
+    said = {key: text.replace(cause.words, words_in(run, cause)) for key, text in texts.items()}
+    return verdict.model_copy(update=said)
 
 
 def words_in(run: Run, cause: Condition) -> str:
