@@ -13,13 +13,8 @@ from pydantic import Field, model_validator
 from grader.checks.registry import ProcessName, check
 from grader.checks.support.console_output import (
     Line,
-    filled,
-    line_that_prints,
     lines_and_errors,
-    not_reached,
     stream_lines,
-    unprinted_result,
-    unreached_except,
 )
 from grader.checks.support.exit_causes import (
     explain_end,
@@ -50,6 +45,13 @@ from grader.checks.support.text import (
     words_pattern,
 )
 from grader.checks.support.topics import cite, reads_keys, unheard
+from grader.checks.support.wrong_lines import (
+    filled,
+    line_that_prints,
+    not_reached,
+    unprinted_result,
+    unreached_except,
+)
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record

@@ -9,7 +9,7 @@ from pathlib import PurePosixPath
 from typing import Annotated, Any
 
 from grader.checks.registry import Refers, check
-from grader.checks.support.console_output import Line, of_no_node, printed_lines
+from grader.checks.support.console_output import Line, printed_lines
 from grader.checks.support.fields import differences, is_number, value_text
 from grader.checks.support.parameters import (
     Given,
@@ -35,6 +35,7 @@ from grader.checks.support.processes import (
 )
 from grader.checks.support.text import get_param, log_param, near_names, set_param, shown
 from grader.checks.support.topics import cite, no_node, run_slip
+from grader.checks.support.wrong_lines import of_no_node
 from grader.evidence.events import ParamEvent
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts

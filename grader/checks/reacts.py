@@ -85,9 +85,7 @@ class ReactsParams(Record):
         if (self.cause is None) == bool(self.within_s):
             raise ValueError("give cause and within_s together")
         if self.least_s and (self.never or self.least_s >= self.within_s):
-            raise ValueError(
-                "least_s is less than within_s, and not for never: silence begins after within_s"
-            )
+            raise ValueError("least_s is less than within_s, and not for never, which begins after within_s")
         return self
 
     @property

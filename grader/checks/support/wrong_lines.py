@@ -1,17 +1,21 @@
-"""Lost marks that lines of a script explain: a value that goes wrong there, or a callback that waits."""
+"""Lost marks that lines of a script explain: a value that goes wrong there, a callback that waits, or a line that would
+print what is missing."""
 
 from __future__ import annotations
 
-from collections.abc import Collection
+import re
+from collections.abc import Callable, Collection, Iterable
+from pathlib import PurePosixPath
 
 from grader.checks.registry import Check
-from grader.checks.support.processes import ends_twice
+from grader.checks.support.console_output import Line
+from grader.checks.support.processes import Life, ends_twice, run_slips
 from grader.checks.support.scans import begins_ahead
 from grader.checks.support.topics import files_that_run, reach_hint, why_unreached
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.python_slip import PythonSlip
-from grader.model.verdict import Status, Verdict
+from grader.model.verdict import Status, Verdict, failed
 
 SEEN_AS = {
     "nan": "nan", "degrees": "value", "return": "nothing", "empty": "value", "bounds": "", "added": "",
@@ -172,3 +176,74 @@ def explain_by_waiting_callback(check: Check, package: PackageFacts, run: Run, v
         f": {ends} until the callback ends" if slip.name and not slip.is_lock else ""
     )
     return verdict.explained(f"in {slip.file}, {slip.message}", hint, (slip.place,), cause=slip.message)
+
+
+def filled(slip: PythonSlip) -> str:
+    """Return the text that a line prints; a place that the script fills in may hold any number."""
+    return re.sub(r"\{\w*\}", "0", slip.message)
+
+
+def line_that_prints(package: PackageFacts, run: Run, could_be: Callable[[str], bool]) -> PythonSlip | None:
+    """Return the line of a script that runs which prints such a text, if it is reached."""
+    return next((s for s in run_slips(package, run, "prints") if could_be(filled(s))), None)
+
+
+def of_no_node(verdict: Verdict, package: PackageFacts, scripts: Collection[str | None]) -> Verdict:
+    """Return the verdict; where one of the scripts makes no node, so that what it logs is shown nowhere, with that."""
+    found = (s for s in package.slips if s.kind == "no-init" and s.file in scripts)
+    if (slip := next(found, None)) is None:
+        return verdict
+    why = f"{slip.message}, without which nothing that is logged is shown"
+    hint = f"in {slip.file}, write `rospy.init_node('{PurePosixPath(slip.file).stem}')` below the imports"
+    return verdict.explained(why, hint, (slip.place,))
+
+
+def not_reached(verdict: Verdict, slip: PythonSlip, package: PackageFacts) -> Verdict:
+    """Return a loss with the line that prints what is missing, and was never reached; or that logs it in no node."""
+    unlogged = of_no_node(verdict, package, [slip.file]) if slip.name in ("loginfo", "logdebug") else verdict
+    if unlogged is not verdict:
+        return unlogged.about(citations=(slip.place, *verdict.citations))
+    why = f"line {slip.line} of {slip.file} does, and is never reached"
+    hint = f"see what keeps line {slip.line} from being reached: print what the condition above it compares"
+    return verdict.explained(why, hint, (slip.place,))
+
+
+def unprinted_result(
+    package: PackageFacts, one: Life, never: str, words: str, found_in: Callable[[Line], Iterable[object]]
+) -> Verdict | None:
+    """Return the loss where a function of the script returns the words, or the number in them, and nothing prints what
+    it returns; `never` begins the message."""
+    script = one.start.script or ""
+    own = [s for s in package.slips if (s.kind, s.file) == ("drops-result", script)]
+    texts = [s for s in own if any(found_in(Line(0, filled(s))))]
+    numbers = [s for s in own if s.message == "{}" and re.search(r"\d|<number>", words)]
+    slip = next(iter(texts or numbers), None)
+    if slip is None:
+        return None
+    call = f"`{slip.name}(…)` on line {slip.line}"
+    why = f"line {slip.fix} of {slip.file} returns {'it' if texts else 'the number'}"
+    hint = f"print what {call} returns" if texts else f"print {words} above line {slip.fix}"
+    message = f"{never}: {why}, and nothing keeps what {call} returns"
+    return failed(message, hint=hint, citations=(slip.place,))
+
+
+def unreached_except(
+    package: PackageFacts,
+    one: Life,
+    never: str,
+    found_in: Callable[[Line], Iterable[object]],
+    lost: Callable[..., Verdict],
+) -> Verdict | None:
+    """Return the loss where an `except` prints the words, and what is above it raised nothing; `lost` makes it."""
+    # what a script still waits for may yet be caught
+    own = [s for s in package.slips if s.file == one.start.script and one.ended_early]
+    said = [s for s in own if s.kind == "prints" and any(found_in(Line(0, filled(s))))]
+    caught = {s.line + 1: s for s in own if s.kind == "catches"}
+    if len(said) != 1 or said[0].line not in caught:
+        return None
+    slip, lines = said[0], caught[said[0].line].name.replace("-", " to ")
+    message = (
+        f"{never}: line {slip.line} of {slip.file} would, and lines {lines} raise nothing that it catches"
+    )
+    hint = "look at what is called there: where the handout asks for a failure, a service's callback has to raise one"
+    return lost(message, hint=hint, citations=(slip.place,)).if_repeated()
