@@ -78,6 +78,7 @@ def rates_unused(loop, function, tree):
     """Yield the loop of a script that makes one Rate, above it, and sleeps nowhere."""
     rates = [n for n in all_of(tree, ast.Assign) if is_call(n.value, "Rate")]
     named = any(isinstance(n, ast.Attribute) and n.attr == "sleep" for n in ast.walk(tree))
+    named = named or any(".sleep(" in str(n.value) for n in all_of(tree, ast.Constant))  # in quotes
     skipped = any(isinstance(n, ast.Continue) for n in ast.walk(loop))
     if len(rates) != 1 or named or skipped or not isinstance(loop, ast.While) or calls_in(tree, *WAITS):
         return
