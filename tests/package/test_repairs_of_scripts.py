@@ -273,6 +273,10 @@ CASES = {
             "class": ([("\ndef main():", f"{TWICE}a = A\na.g(1)\ndef main():")], 1, "is the class itself", "a = A()"),
             "of-self": ([("\ndef main():", f"{TWICE}    def f(self): g(n)\ndef main():")], 1, "belongs to the class A",
                         "self.g(self.n)"),
+            "without-a-value": ([("'talker')", "'talker', anonymous)")], 1, "is named here without its value",
+                                "anonymous=True"),
+            "queue-without-a-value": ([("queue_size=10", "queue_size")], 1, "is named here without", "queue_size=10"),
+            "two-values": ([("publish(1)", "publish(rate, 2)")], 1, "takes one value", "publish(rate)"),
             "callback": ([("\nmain()", "\nrospy.on_shutdown('main')\nmain()")], 1, "'main' is a string",
                          "down(main)"),
         }.items()

@@ -208,6 +208,7 @@ def _wrong_arguments(tree: ast.Module, kinds: list[str]) -> Iterator[Argument]:
             yield from _in_quotes(call, name, known)
             yield from _of_topic(call, types, kinds) if name in {"Publisher", "Subscriber"} else ()
             yield from _type_of_topic(call, types, functions) if name in {"Publisher", "Subscriber"} else ()
+            yield from _without_value(call, name, known)
             yield from _numbers(call, name)
             yield from _callback(call, name, functions)
             yield from _without_callback(call, tree) if name == "Subscriber" else ()
@@ -224,6 +225,17 @@ def _in_quotes(call: ast.Call, name: str, known: AbstractSet[str]) -> Iterator[A
     if first is not None and len(inner.body) == 1 and names - {"f"} and names - {"f"} <= known:
         why = "the quotes end behind the name, before the other arguments"
         yield Argument([(first, f"{begin!r}, {rest.strip()}")], why)
+
+
+VALUED = {"init_node": ("anonymous", "True"), "Publisher": ("queue_size", "10")}
+
+
+def _without_value(call: ast.Call, name: str, known: AbstractSet[str]) -> Iterator[Argument]:
+    """Of `init_node('x', anonymous)` and `Publisher('x', String, queue_size)`, whose last argument lacks its value."""
+    word, value = VALUED.get(name, ("", ""))
+    found = [one for one in call.args if isinstance(one, ast.Name) and one.id == word and word not in known]
+    if found:
+        yield Argument([(found[0], f"{word}={value}")], f"`{word}` is named here without its value")
 
 
 def _of_topic(call: ast.Call, types: set[str], kinds: list[str]) -> Iterator[Argument]:
@@ -288,6 +300,8 @@ def _published_together(call: ast.Call, kind: str) -> Iterator[Argument]:
         yield Argument([(call, f"{ast.unparse(call.func)}({ast.unparse(values[0])})")], why)
     elif kind == "String" and values and _is_text(text) and _has_no_other_places(text.value, len(values)):
         yield Argument([(call, f"{ast.unparse(call.func)}({_formatted(text.value, values)})")], why)
+    elif (NUMBERS.fullmatch(kind) or kind == "String") and values and isinstance(text, ast.Name):
+        yield Argument([(call, f"{ast.unparse(call.func)}({text.id})")], why)
 
 
 def _behind_commas(tree: ast.Module) -> Iterator[Argument]:
