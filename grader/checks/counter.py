@@ -122,9 +122,11 @@ def _cite_start(
     wrong = [one for one in starts if int(one.message) + (one.name in count_up) == first.values[0]]
     # Of several such lines, or where several add one, none is known to be what made the first value.
     if len(wrong) != 1 or len(count_up) < len(added):
-        if first.values[0] > params.start and first.is_flood(run, params.rate_hz):
+        if first.values[0] <= params.start or not first.is_flood(run, params.rate_hz):
+            return verdict
+        if added or len(starts) != 1 or int(starts[0].message) == params.start:
             return judge_flood(params.topic, "drops the first values", params.rate_hz)
-        return verdict
+        wrong = starts  # the only line that sets it, whatever the flood drops
     slip = wrong[0]
     where = f"line {slip.line} of {slip.file}"
     name = BEGINNINGS.get(slip.name, f"`{slip.name}`")

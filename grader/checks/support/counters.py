@@ -204,13 +204,9 @@ def judge_steps(count: Count, found: Wrong, run: Run, params: CounterParams) -> 
 
 
 def _usual_fault(usual: float) -> str:
-    return (
-        "stays at one value"
-        if usual == 0
-        else f"counts in steps of {significant(usual)}"
-        if usual > 0
-        else "counts down"
-    )
+    if usual == 0:
+        return "stays at one value"
+    return f"counts in steps of {significant(usual)}" if usual > 0 else "counts down"
 
 
 def steps_to_judge(count: Count, maximum: int) -> tuple[Step, ...]:
@@ -325,7 +321,10 @@ def judge_wraps(
         # Past the maximum, the first bad step is no turn yet: the line is told by where the counter turns in the end.
         turn = next((s for s in turns if s.before > params.maximum), bad) if bad.change > 0 else bad
         written = slips_of(package, run, count.callerid, "reset-value", "reset-limit")
-        return _where_reset(_bad_turn(bad, turns, count, run, params), turn, written, params), bad
+        lost = _bad_turn(bad, turns, count, run, params)
+        if whose_turn(bad, count, run, params) == "flood":
+            lost = _by_range(count, run, package, params) or lost
+        return _where_reset(lost, turn, written, params), bad
     last = good[-1] if good else None
     if len(good) >= params.wraps:
         message = f"after {significant(good[0].before)} comes {params.minimum}, {plural(len(good), 'time')}"
@@ -335,6 +334,17 @@ def judge_wraps(
         return grade_again(f"only {plural(len(good), 'reset')} of {params.wraps} is recorded"), last
     verdict = _judge_death(count, run, package, params) or _stuck(count, params)
     return verdict or _silent(count, run, package, params) or _too_few(count, good, run, params), last
+
+
+def _by_range(count: Count, run: Run, package: PackageFacts, params: WrapParams) -> Verdict | None:
+    """Return the loss by a range that begins with another number than the minimum: no flood makes that right."""
+    found = [s for s in slips_of(package, run, count.callerid, "start-value") if s.name == "range"]
+    if len(found) != 1 or int(found[0].message) == params.minimum:
+        return None
+    slip = found[0]
+    message = RESETS_TO.format(significant(max(count.values)), slip.message, params.minimum)
+    hint = f"on line {slip.line} of {slip.file}, let the range begin with {params.minimum}"
+    return failed(message, hint=hint, citations=(slip.place,))
 
 
 def cite_slip(verdict: Verdict, count: Count, run: Run, package: PackageFacts, *kinds: SlipKind) -> Verdict:

@@ -210,9 +210,8 @@ def published_unchanged(tree):
         for call in (n for n in told if called_name(n) == "publish" and len(n.args) == 1):
             name = dotted(call.args[0])
             stored = set_at.get(name, [])
-            fields = [
-                one for one in stored if one != name
-            ]  # of a message that is made above, they are what changes
+            # of a message that is made above, its fields are what changes
+            fields = [one for one in stored if one != name]
             parts = [one for one in fields or stored if one not in plain]
             above = all(one in made and made[one].lineno < loop.lineno for one in stored)
             if not parts or name in used or not above or len(set(stored)) < len(stored):
