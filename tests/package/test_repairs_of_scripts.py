@@ -285,6 +285,13 @@ CASES = {
         {TALKER: SCRIPT, "src/own.py": "from std_msgs.msg import Int8\ndef f():\n    m = Int8\n    print(m)\n"
          "def g():\n    m = Int8()\n    m.data = 1\n"}, [],
     ),
+    "only-publish-in-a-comment": Case(
+        swapped(TALKER, ("        publisher.publish(1)", "        # publisher.publish(1)")), ["missing-call"],
+        "line 10 of src/talker.py: `publisher.publish(1)` is commented out",
+    ),
+    "publish-in-a-comment-beside-another": Case(
+        swapped(TALKER, ("publisher.publish(1)", "# publisher.publish(1)\n        publisher.publish(2)")), [],
+    ),
     "rate-before-the-node": Case(
         {TALKER: SCRIPT.replace("def main():\n", "def main():\n    early = rospy.Rate(5)\n    name = 'a'\n", 1)},
         ["missing-call"], "move `rospy.init_node(…)` from line 8 up, above line 6",

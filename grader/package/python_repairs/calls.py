@@ -91,6 +91,25 @@ def with_quoted_calls(text: str) -> Iterator[Step]:
             return
 
 
+COMMENTED = re.compile(r"(\s*)#+(\s*)(([\w.]+)\.publish\(.*\))\s*$")
+
+
+def with_publish_uncommented(text: str) -> Iterator[Step]:
+    """`# pub.publish(text)`, where nothing else publishes by that publisher."""
+    tree, lines = tree_of(text), text.split("\n")
+    given = [n for n in nodes_in(tree) if isinstance(n, ast.Assign) and _called(n.value) == "Publisher"]
+    made = {ast.unparse(target) for one in given for target in one.targets}
+    calls = [n.func for n in nodes_in(tree) if isinstance(n, ast.Call) and isinstance(n.func, ast.Attribute)]
+    used = {ast.unparse(one.value) for one in calls if one.attr == "publish"}
+    found = [
+        (at, one) for at, line in enumerate(lines) if (one := COMMENTED.match(line)) and one[4] in made - used
+    ]
+    if len(found) == 1:
+        at, one = found[0]
+        after = "\n".join([*lines[:at], f"{one[1] or one[2]}{one[3]}", *lines[at + 1 :]])
+        yield from step_to("comment", at + 1, text, after, one[3])
+
+
 def _uncalled_expressions(node: ast.AST) -> Iterator[ast.expr]:
     """Yield what stands there by itself and says nothing: a statement, or a condition."""
     if isinstance(node, ast.Expr):

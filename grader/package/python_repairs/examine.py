@@ -24,6 +24,7 @@ from grader.package.python_repairs.calls import (
     with_callbacks,
     with_calls,
     with_lines_turned,
+    with_publish_uncommented,
     with_quoted_calls,
     with_values_called,
 )
@@ -146,6 +147,7 @@ def _steps(text: str, types: list[str], known: Known, node: str, *, is_run: bool
             with_values_called,
             with_calls,
             with_quoted_calls,
+            with_publish_uncommented,
             with_callbacks,
             lambda t: with_arguments(t, types),
             with_globals,

@@ -38,13 +38,12 @@ ATTEMPTS = 3
 Cause = Literal[
     "merged", "tabs", "level", "indent", "braces", "commented", "python2", "characters", "token", "global", "outside",
     "old-name", "module", "other-module", "import", "name", "quotes", "attribute", "value", "call", "quoted",
-    "callback", "argument", "unbound", "kept", "guard", "inside", "start", "late", "main", "init", "server", "spin",
-    "line",
-    "twice", "turned", "empty", "emptied",
+    "comment", "callback", "argument", "unbound", "kept", "guard", "inside", "start", "late", "main", "init", "server",
+    "spin", "line", "twice", "turned", "empty", "emptied",
 ]  # fmt: skip
 CALLS = (
-    "name", "quotes", "attribute", "value", "call", "quoted", "callback", "argument", "unbound", "kept", "guard",
-    "inside", "start", "late", "main", "init", "server", "spin",
+    "name", "quotes", "attribute", "value", "call", "quoted", "comment", "callback", "argument", "unbound", "kept",
+    "guard", "inside", "start", "late", "main", "init", "server", "spin",
 )  # fmt: skip
 KINDS: dict[str, RepairKind] = {
     **dict.fromkeys(("module", "other-module", "import"), "missing-import"),
@@ -501,6 +500,7 @@ WORDS: dict[Cause, tuple[str, str]] = {
     "value": ("{place}: {word} is given a value with `=`, and has to be called", ""),
     "call": ("{place}: {word} is named but not called", "write {calls}"),
     "quoted": ("{place}: {word} is in quotes, so it never runs", ""),
+    "comment": ("{place}: `{word}` is commented out", "remove the `#` from line {line}"),
     "callback": ("{place}: {calls} is called where the function itself is meant", ""),
     "argument": ("{place}: {word}", ""),
     "guard": ("{place}: {word}", ""),
