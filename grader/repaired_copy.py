@@ -36,7 +36,7 @@ from grader.model.verdict import FileCitation
 from grader.package.manifest import parse_manifest
 from grader.package.repairs import NotRepairable, apply_repair, find_repairs, wanted_of
 from grader.package.repairs.editing import read_data
-from grader.package.repairs.python import conversions, ros_clock, turn_sign
+from grader.package.repairs.python import conversions, ros_clock, text_place, turn_sign
 from grader.rubric.model import Rubric
 
 STEERS_WRONG, WARPED = "steers-wrong", "warped"
@@ -96,6 +96,7 @@ def choose_repairs(
     return (*before, *chosen), tuple(scenarios)
 
 
+OF_NUMBERS = "write %s for %d or %f"
 CONVERTED = re.compile(r"write `(str|int|float)\(([^`]+)\)` instead of `\2`")
 
 
@@ -106,10 +107,12 @@ def _of_errors(
     known = {(one.file, one.line) for one in found}
     for criterion in (one for one in criteria if one.status.is_lost and not one.blocked_by):
         cited = next((one for one in criterion.citations if isinstance(one, FileCitation)), None)
-        told = CONVERTED.search(criterion.hint)
-        if told is None or cited is None or cited.line is None or cited.file.startswith("../"):
+        if cited is None or cited.line is None or cited.file.startswith("../"):
             continue
-        for repair in conversions(submission.package.folder, cited.file, cited.line, told[1], told[2]):
+        place = (submission.package.folder, cited.file, cited.line)
+        told = CONVERTED.search(criterion.hint)
+        repairs = conversions(*place, told[1], told[2]) if told else []
+        for repair in text_place(*place) if OF_NUMBERS in criterion.hint else repairs:
             if (repair.file, repair.line) not in known:
                 known.add((repair.file, repair.line))
                 yield repair

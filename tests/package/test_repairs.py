@@ -17,7 +17,7 @@ from grader.package.python_repairs.syntax import Step, step_to
 from grader.package.repairs import NotRepairable, apply_repair, find_repairs
 from grader.package.repairs.editing import changed_lines
 from grader.package.repairs.names import is_near, is_one_edit
-from grader.package.repairs.python import conversions, ros_clock
+from grader.package.repairs.python import conversions, ros_clock, text_place
 from grader.repaired_copy import REPAIRS_MAX, most_of
 from tests.package.repairing import (
     CMAKE,
@@ -565,3 +565,12 @@ def test_what_a_run_ended_of_is_converted_there_and_where_the_same_is_joined_to_
         apply_repair(tmp_path, one)
     assert (tmp_path / "a.py").read_text() == code.replace("' + n)", "' + str(n))")
     assert conversions(tmp_path, "b.py", 3, "str", "n") == []
+
+
+def test_a_text_gets_its_place_at_the_line_where_a_run_ended(tmp_path):
+    (tmp_path / "a.py").write_text(
+        "log('Received: %d', m.data)\nlog('%d of %d', m.data, 3)\nlog('100 %done')\n"
+    )
+    (repair,) = text_place(tmp_path, "a.py", 1)
+    assert (repair.after, repair.fix) == ("log('Received: %s', m.data)", "write `%s` instead of `%d`")
+    assert [text_place(tmp_path, "a.py", line) for line in (2, 3, 9)] == [[], [], []]

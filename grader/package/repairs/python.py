@@ -302,6 +302,21 @@ def conversions(folder: Path, file: str, line: int, function: str, value: str) -
     return list(files.repairs)
 
 
+NUMBER_PLACE = re.compile(r"%[-+ #0-9.]*[dif](?!\w)")
+
+
+def text_place(folder: Path, file: str, line: int) -> list[Repair]:
+    """Return the repair that makes `%s` of the only `%d` or `%f` of a line at which a run ended, as a text came."""
+    files = Files(folder=folder.resolve())
+    lines = (files.text(file) or "").split("\n")
+    found = NUMBER_PLACE.findall(lines[line - 1]) if line <= len(lines) else []
+    if len(found) == 1:
+        lines[line - 1] = lines[line - 1].replace(found[0], "%s")
+        message = f"line {line} of {file}: `{found[0]}` takes a number, and gets a text"
+        files.change("missing-call", file, "\n".join(lines), message, f"write `%s` instead of `{found[0]}`")
+    return list(files.repairs)
+
+
 def ros_clock(folder: Path, file: str) -> Repair | None:
     """Return the repair that measures time and waits by ROS's clock in a script that does so by the computer's; None
     where it does not."""
