@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import json
 import posixpath
-import re
 import shutil
 from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
@@ -38,6 +37,7 @@ from grader.package.repairs import NotRepairable, apply_repair, find_repairs, wa
 from grader.package.repairs.editing import read_data
 from grader.package.repairs.python import conversions, ros_clock, text_place, turn_sign
 from grader.rubric.model import Rubric
+from grader.wording import CONVERTED, TEXT_PLACE
 
 STEERS_WRONG, WARPED = "steers-wrong", "warped"
 REPAIRS_MAX = 4
@@ -96,10 +96,6 @@ def choose_repairs(
     return (*before, *chosen), tuple(scenarios)
 
 
-OF_NUMBERS = "write %s for %d or %f"
-CONVERTED = re.compile(r"write `(str|int|float)\(([^`]+)\)` instead of `\2`")
-
-
 def _of_errors(
     submission: Submission, criteria: Sequence[CriterionResult], found: Collection[Repair]
 ) -> Iterator[Repair]:
@@ -112,7 +108,7 @@ def _of_errors(
         place = (submission.package.folder, cited.file, cited.line)
         told = CONVERTED.search(criterion.hint)
         repairs = conversions(*place, told[1], told[2]) if told else []
-        for repair in text_place(*place) if OF_NUMBERS in criterion.hint else repairs:
+        for repair in text_place(*place) if TEXT_PLACE in criterion.hint else repairs:
             if (repair.file, repair.line) not in known:
                 known.add((repair.file, repair.line))
                 yield repair

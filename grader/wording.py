@@ -212,3 +212,14 @@ def the_same_on(numbers: Sequence[int]) -> str:
 def lines_text(first: int, last: int) -> str:
     """Return `line 3`, or `lines 3 to 5`, of lines from 0."""
     return f"line {first + 1}" if last == first else f"lines {first + 1} to {last + 1}"
+
+
+TEXT_PLACE = "write %s for %d or %f"
+"""The hint on a text that comes where a `%d` or `%f` is; `repaired_copy.py` finds it again."""
+CONVERTED = re.compile(r"write `(str|int|float)\(([^`]+)\)` instead of `\2`")
+"""The function and the value in a hint of `convert`."""
+
+
+def convert(function: str, value: str) -> str:
+    """Return the hint on a value of another type than is needed: ``write `str(n)` instead of `n` ``."""
+    return f"write `{function}({value})` instead of `{value}`"

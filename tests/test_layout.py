@@ -66,7 +66,7 @@ ALLOWED = {
         "rubric.model", "rubric.pytest_check", "rubric.scenario"
     },
     "submitted_recordings": BASE | {"evidence", "files", "intake", "rubric.model"},
-    "repaired_copy": {"files", "judging", "model", "package", "rubric"},
+    "repaired_copy": {"files", "judging", "model", "package", "rubric", "wording"},
     "recording": BASE | {
         "arena", "evidence", "files", "installable", "judging", "package", "repaired_copy", "ros_env",
         "rubric", "submitted_recordings"

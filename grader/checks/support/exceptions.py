@@ -25,7 +25,7 @@ from grader.installable import noetic_messages
 from grader.model.package import PackageFacts
 from grader.model.python_slip import PythonSlip
 from grader.model.verdict import FileCitation
-from grader.wording import join_words, plural
+from grader.wording import TEXT_PLACE, join_words, plural
 
 HIDDEN = (
     "str", "int", "float", "list", "dict", "len", "max", "min", "sum", "range", "input", "print", "type", "round",
@@ -325,7 +325,7 @@ def _no_number(message: str, source: str) -> Meaning | None:
         other = "leave out `str(…)`" if "str(" in source else "compare it with a text"
         return "text is compared with a number", f"turn the text into a number first, or {other}"
     if wanted := _WANTS_NUMBER.search(message):
-        hint = "write %s for %d or %f" if "%" in source else "turn the text into a number: `float(…)`"
+        hint = TEXT_PLACE if "%" in source else "turn the text into a number: `float(…)`"
         return f"a number is needed here, but it is of the type {wanted[1] or wanted[2]}", hint
     return None
 

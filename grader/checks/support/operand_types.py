@@ -11,6 +11,7 @@ from grader.checks.support.rospy_calls import fields_of, line_tree
 from grader.checks.support.text import shown
 from grader.line_slips.python import parsed
 from grader.model.package import PackageFacts
+from grader.wording import convert
 
 _ADDED = re.compile(
     r"can only concatenate str \(not \"(\w+)\"\) to str|unsupported operand type\(s\) for \+=?: '(\w+)' and '(\w+)'"
@@ -66,7 +67,7 @@ def _beside_text(other: str, kind: str) -> tuple[str, str]:
         fix = f"where {other} gets its value, write `%` instead of the comma behind the text"
         return f"{other} is no text: a comma makes several values of it", fix
     if other:
-        return f"{other} is not a string", f"write `str({other})` instead of `{other}`"
+        return f"{other} is not a string", convert("str", other)
     article = "an" if kind[0] in "aeiou" else "a"
     return f"{article} {kind} is not a string", "wrap it in `str(…)` before you add it to a string"
 

@@ -14,7 +14,7 @@ from grader.installable import noetic_messages
 from grader.line_slips.python import parsed
 from grader.model.package import PackageFacts
 from grader.model.python_slip import PythonSlip
-from grader.wording import join_words, on_lines
+from grader.wording import convert, join_words, on_lines
 
 Meaning = tuple[str, str]
 """The cause, and what to do."""
@@ -400,8 +400,8 @@ def _no_whole_number(source: str, sent: ast.Call | None, slips: Sequence[PythonS
         return point[0], rewritten(source, (sent.args[0], point[1]))
     name = ast.unparse(sent.args[0])
     if any((one.kind, one.name) == ("start-value", name) for one in slips):  # a counter is for its own topic
-        why = f"the message takes a whole number, and `{name}`, which begins as one, is none any more"
-        return why, f"write `int({name})` instead of `{name}`"
+        why = f"the message takes a whole number, and `{name}`, which begins as one, no longer is"
+        return why, convert("int", name)
     return None
 
 

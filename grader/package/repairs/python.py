@@ -24,7 +24,7 @@ from grader.model.record import Record
 from grader.model.repair import ASKED, Repair, RepairKind, as_code
 from grader.package.python import TOO_FAR_IN, reason_of
 from grader.package.repairs.editing import KEEP_ONE, Files, emptied_lines
-from grader.wording import is_one_edit, join_words, numbers_text, on_lines, plural
+from grader.wording import convert, is_one_edit, join_words, numbers_text, on_lines, plural
 
 EXAMINE = "grader.package.python_repairs.examine:examine"
 TURN = "grader.package.python_repairs.examine:with_sign_turned"
@@ -296,9 +296,7 @@ def conversions(folder: Path, file: str, line: int, function: str, value: str) -
             lines = (files.text(file) or "").split("\n")
             lines[number - 1] = re.sub(name, lambda _: right, code)
             message = f"line {number} of {file}: `{value}` is of another type than is needed here"
-            files.change(
-                "missing-call", file, "\n".join(lines), message, f"write `{right}` instead of `{value}`"
-            )
+            files.change("missing-call", file, "\n".join(lines), message, convert(function, value))
     return list(files.repairs)
 
 
