@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.package.python_repairs.rospy_names import with_attributes, with_logger
+from grader.package.python_repairs.rospy_names import with_attributes, with_logger, with_times
 from tests.package.repairing import SCRIPT, SPINS, TALKER, Case, check, swapped
 
 pytestmark = pytest.mark.usefixtures("without_processes")
@@ -224,4 +224,25 @@ def test_what_a_script_of_rospy_lacks_is_added(case: Case, tmp_path: Path) -> No
 def test_rospy_may_be_imported_under_another_name(wrong: str, right: str) -> None:
     head = "import rospy as r\n\nr.init_node('a')\n"
     steps = list(with_attributes(f"{head}{wrong}\n"))
+    assert [one["text"] for one in steps] == ([f"{head}{right}\n"] if right else [])
+
+
+@pytest.mark.parametrize(
+    ("wrong", "right"),
+    [
+        ("m.header.stamp = r.get_time()", "m.header.stamp = r.Time.now()"),
+        ("m.header.stamp = time.time()", "m.header.stamp = r.Time.now()"),
+        ("h.stamp = r.Time.now().to_sec()", "h.stamp = r.Time.now()"),
+        ("marker.lifetime = 0.5", "marker.lifetime = r.Duration(0.5)"),
+        ("self.stamp = r.get_time()", ""),
+        ("stamp = r.get_time()", ""),
+        ("m.header.stamp = r.Time.now()", ""),
+        ("m.header.stamp = r.Time.from_sec(time.time())", ""),
+        ("m.lifetime = r.Duration(2)", ""),
+        ("cat.lifetime = True", ""),
+    ],
+)
+def test_a_time_of_a_message_is_no_number(wrong: str, right: str) -> None:
+    head = "import rospy as r\n\nr.init_node('a')\n"
+    steps = list(with_times(f"{head}{wrong}\n"))
     assert [one["text"] for one in steps] == ([f"{head}{right}\n"] if right else [])

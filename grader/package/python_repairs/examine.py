@@ -56,6 +56,7 @@ from grader.package.python_repairs.rospy_names import (
     with_logger,
     with_node_first,
     with_rospy,
+    with_times,
 )
 from grader.package.python_repairs.shared_variables import with_globals
 from grader.package.python_repairs.syntax import (
@@ -145,6 +146,7 @@ def _steps(text: str, types: list[str], known: Known, node: str, *, is_run: bool
             with_logger,
             with_message_classes,
             with_values_called,
+            with_times,
             with_calls,
             with_quoted_calls,
             with_publish_uncommented,

@@ -266,6 +266,42 @@ NEED_NODE = ("Rate", "sleep", "get_time", "get_rostime", "Time.now", "wait_for_m
 """What fails in rospy before the node is made."""
 
 
+def with_times(text: str) -> Iterator[Step]:
+    """`stamp = rospy.Time.now()` for `stamp = rospy.get_time()`, and `lifetime = rospy.Duration(5)` for `lifetime = 5`:
+    a message's time is no number of seconds."""
+    tree, lines = tree_of(text), text.split("\n")
+    rospy = rospy_in(tree)
+    found = [
+        (target, node.value)
+        for node in nodes_in(tree)
+        if isinstance(node, ast.Assign)
+        for target in node.targets
+        if isinstance(target, ast.Attribute) and last_name(target.value) != "self"
+    ]
+    edits, words = [], dict[str, int]()
+    for target, value in found if rospy else ():
+        right, span = _right_time(target.attr, value, rospy), span_of(lines, value)
+        if right and span is not None:
+            edits.append((*span, right.format(lines[span[0]][slice(*span[1:])])))
+            words.setdefault(ast.unparse(target), target.lineno)
+    if edits:
+        yield from step_to("time", min(words.values()), text, edited(text, edits), ", ".join(words))
+
+
+def _right_time(field: str, value: ast.expr, rospy: str) -> str:
+    """Return what is to be written in place of a number that is given to a time; "" where it is none."""
+    called = ast.unparse(value.func).rpartition(".")[2] if isinstance(value, ast.Call) else ""
+    if field == "stamp" and called in {"get_time", "time", "to_sec", "to_nsec", "time_ns"}:
+        return f"{rospy}.Time.now()"
+    number = value.value if isinstance(value, ast.Constant) else None
+    is_number = isinstance(number, int | float) and not isinstance(number, bool)
+    return f"{rospy}.Duration({{}})" if field in DURATIONS and is_number else ""
+
+
+DURATIONS = ("lifetime", "time_from_start", "time_to_live")
+"""Fields of ROS's messages that are durations."""
+
+
 def with_node_first(text: str) -> Iterator[Step]:
     """A script that makes its node below a line of the same block that needs it: `init_node` moves up."""
     tree, lines = tree_of(text), text.split("\n")

@@ -37,13 +37,13 @@ ATTEMPTS = 3
 
 Cause = Literal[
     "merged", "tabs", "level", "indent", "braces", "commented", "python2", "characters", "token", "global", "outside",
-    "old-name", "module", "other-module", "import", "name", "quotes", "attribute", "value", "call", "quoted",
+    "old-name", "module", "other-module", "import", "name", "quotes", "attribute", "value", "time", "call", "quoted",
     "comment", "callback", "argument", "unbound", "kept", "guard", "inside", "start", "late", "main", "init", "server",
     "spin", "line", "twice", "turned", "empty", "emptied",
 ]  # fmt: skip
 CALLS = (
-    "name", "quotes", "attribute", "value", "call", "quoted", "comment", "callback", "argument", "unbound", "kept",
-    "guard", "inside", "start", "late", "main", "init", "server", "spin",
+    "name", "quotes", "attribute", "value", "time", "call", "quoted", "comment", "callback", "argument", "unbound",
+    "kept", "guard", "inside", "start", "late", "main", "init", "server", "spin",
 )  # fmt: skip
 KINDS: dict[str, RepairKind] = {
     **dict.fromkeys(("module", "other-module", "import"), "missing-import"),
@@ -468,7 +468,7 @@ def _words(file: str, cause: Cause, steps: list[_Step], before: str) -> tuple[st
         "further": further,
     }  # fmt: skip
     said, fix = (words.format(**known) for words in WORDS[cause])
-    if cause == "quotes":
+    if cause in {"quotes", "time"}:
         fix = _rewritten(before, after)
     if cause in {"tabs", "level", "inside"}:
         fix = _required_indentation(before, after, fix)
@@ -511,6 +511,7 @@ WORDS: dict[Cause, tuple[str, str]] = {
     "quotes": ("{place}: quotes are missing around {word}", ""),
     "attribute": ("{place}: there is no {word}", ""),
     "value": ("{place}: {word} is given a value with `=`, and has to be called", ""),
+    "time": ("{place}: {word} must be a time of ROS, not a number", ""),
     "call": ("{place}: {word} is named but not called", "write {calls}"),
     "quoted": ("{place}: {word} is in quotes, so it never runs", ""),
     "comment": ("{place}: `{word}` is commented out", "remove the `#` from line {line}"),
