@@ -225,6 +225,7 @@ def _missing(package: PackageFacts, path: str) -> Verdict:
     if meant:
         moved, named = move_hint(package, meant[0], path), _where_named(package, meant[0])
         plain = len(movable) == 1 or PurePosixPath(meant[0]).name == wanted.name
+        named += _bit_there(package, meant[0], path)
         hint = f"{moved}{named}" if plain else f"{hint}, or {moved} if that is meant to be it{named}"
     kind: MistakeKind = "file-elsewhere" if meant else "file-missing"
     if not movable and (elsewhere := (*package.hints_on(wanted.name), *package.hints_on(str(wanted.parent)))):
@@ -236,6 +237,14 @@ def _missing(package: PackageFacts, path: str) -> Verdict:
         hint=hint,
         citations=tuple(FileCitation(file=p) for p in (near or meant)[:3]),
     ).lost_by(kind, path, meant=next(iter(meant), ""))
+
+
+def _bit_there(package: PackageFacts, path: str, wanted: str) -> str:
+    """Return that the script that is moved lacks its executable bit too, to put behind the command."""
+    there = next((file for file in package.files if file.path == path), None)
+    if there is None or there.executable is not False or asks_for_wrapper(package, path):
+        return ""
+    return f"; {chmod_hint(there.mode_source, wanted)}"
 
 
 def _where_named(package: PackageFacts, path: str) -> str:

@@ -257,7 +257,7 @@ def charged_verdict(
     if any(one not in [*told, *beside] for one in repairs):
         clauses = [c for c in clauses if any(c in one.fix or is_told(one, c) for one in told)]
     hints = clauses + advice_on(one for one in repairs if one not in told)
-    hints += _new_names(verdict, repairs, hints)
+    hints += _new_names(verdict, repairs, hints) + _bits_of_moved(verdict, repairs, hints)
     said = verdict.message
     unsaid = [one for one in repairs if one.kind == "node-name" or not _is_said(one, verdict)]
     words = [said, *(one for one in messages_of(unsaid) if (_PLACE.sub("", one) or one) not in said)]
@@ -282,6 +282,13 @@ def charged_verdict(
         untold_of = tuple(one for one in verdict.basis.sought if one.kind not in {"call", "uncalled"})
         verdict = verdict.based_on(sought=untold_of)
     return verdict.model_copy(update=update)
+
+
+def _bits_of_moved(verdict: Verdict, repairs: Iterable[Repair], told: Collection[str]) -> list[str]:
+    """Return the check's own hints that a script which is renamed is not executable either."""
+    moved = [one.after for one in repairs if one.kind == "file-name"]
+    of_bits = [clause for clause in verdict.hint.split("; ") if clause.startswith("chmod +x ")]
+    return [c for c in of_bits if c not in told and any(f" {path}," in c for path in moved)]
 
 
 def _new_names(verdict: Verdict, repairs: Iterable[Repair], told: Collection[str]) -> list[str]:

@@ -434,6 +434,7 @@ def block_fault(lines, line, message):
         return fault("IndentationError", line, 1, told, text=lines[line - 1])
     if head is not None and "expected an indented" in message:
         is_out = len(blanks_of(lines[line - 1])) < len(blanks_of(lines[head]))
+        is_out = is_out and lines[line - 1].partition("#")[0].strip() != "pass"  # it can only be the body
         told = "the same line twice" if lines[line - 1].strip() == lines[head].strip() else ""
         told = "no indentation in the text" if has_no_indentation(lines) else told
         if not told and (is_out or lacks_body(lines[head], lines[line - 1])):
