@@ -41,6 +41,7 @@ OF_REPAIRS = {
     "package.python_repairs.lost_heads",
     "package.python_repairs.members",
     "package.python_repairs.names",
+    "package.python_repairs.published",
     "package.python_repairs.python2",
     "package.python_repairs.rospy_names",
     "package.python_repairs.shared_variables",

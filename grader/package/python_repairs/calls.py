@@ -11,13 +11,26 @@ from __future__ import annotations
 import ast
 import builtins
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from collections.abc import Set as AbstractSet
 from itertools import chain, pairwise
-from typing import NamedTuple, TypeGuard
 
 from grader.package.python_repairs.members import with_place
 from grader.package.python_repairs.names import bound_in, is_kept_by_self, rospy_in
+from grader.package.python_repairs.published import (
+    NUMBERS,
+    Argument,
+    behind_commas,
+    called,
+    is_text,
+    names_in,
+    published_nothing,
+    published_together,
+    published_type,
+    text_of_a_number,
+    variables_of,
+    with_places,
+)
 from grader.package.python_repairs.syntax import (
     Step,
     edited,
@@ -27,19 +40,11 @@ from grader.package.python_repairs.syntax import (
     step_to,
     tree_of,
 )
-from grader.wording import PAIR
 
 GIVEN_ONE = ("Rate", "sleep", "Duration", "init_node", "loginfo", "logwarn", "logerr")
 CALLED = frozenset({"is_shutdown", "sleep", "spin"})
 QUOTED = re.compile(r"[\w.]+\.(sleep|spin)\([\w.]*\)")
 TAKE_FUNCTIONS = {"Subscriber", "Timer", "Service", "on_shutdown", "signal"}
-
-
-class Argument(NamedTuple):
-    """`edits` are expressions and what belongs in their place, all on one line."""
-
-    edits: list[tuple[ast.expr, str]]
-    why: str
 
 
 def with_values_called(text: str) -> Iterator[Step]:
@@ -67,7 +72,7 @@ def with_calls(text: str) -> Iterator[Step]:
     attributes = (n for n in nodes_in(tree) if isinstance(n, ast.Attribute) and isinstance(n.ctx, ast.Store))
     values = {n.attr for n in attributes} | {n.name for n in functions if n.decorator_list}
     # A parameter or a variable may have the name of a function.
-    own -= {n.arg for n in nodes_in(tree) if isinstance(n, ast.arg)} | _names_in(tree, ast.Store)
+    own -= {n.arg for n in nodes_in(tree) if isinstance(n, ast.arg)} | names_in(tree, ast.Store)
     named = [n for node in nodes_in(tree) for n in _uncalled_expressions(node) if _is_callable(n, own)]
     alone = (n.value for n in nodes_in(tree) if isinstance(n, ast.Expr))
     named += [n for n in alone if isinstance(n, ast.Attribute) and n.attr in own - CALLED]
@@ -97,7 +102,7 @@ COMMENTED = re.compile(r"(\s*)#+(\s*)(([\w.]+)\.publish\(.*\))\s*$")
 def with_publish_uncommented(text: str) -> Iterator[Step]:
     """`# pub.publish(text)`, where nothing else publishes by that publisher."""
     tree, lines = tree_of(text), text.split("\n")
-    given = [n for n in nodes_in(tree) if isinstance(n, ast.Assign) and _called(n.value) == "Publisher"]
+    given = [n for n in nodes_in(tree) if isinstance(n, ast.Assign) and called(n.value) == "Publisher"]
     made = {ast.unparse(target) for one in given for target in one.targets}
     calls = [n.func for n in nodes_in(tree) if isinstance(n, ast.Call) and isinstance(n.func, ast.Attribute)]
     used = {ast.unparse(one.value) for one in calls if one.attr == "publish"}
@@ -175,7 +180,7 @@ def with_lines_turned(text: str) -> Iterator[Step]:
         known = shared | {n.arg for n in nodes_in(function) if isinstance(n, ast.arg)}
         blocks = [n.body for n in nodes_in(function) if isinstance(n, ast.FunctionDef | ast.While | ast.For)]
         for first, second in chain.from_iterable(map(pairwise, blocks)):
-            given, read = _names_in(second, ast.Store), _names_in(first, ast.Load)
+            given, read = names_in(second, ast.Store), names_in(first, ast.Load)
             # With a second value from elsewhere, the line above may rightly read that one.
             late = {name for name in given & read - known if stored.count(name) == 1}
             ends = (first.lineno, first.end_lineno, second.end_lineno)
@@ -188,13 +193,6 @@ def with_lines_turned(text: str) -> Iterator[Step]:
                 return
 
 
-def _names_in(node: ast.AST, kind: type[ast.expr_context]) -> set[str]:
-    """Return the names in a node that it reads, or gives a value."""
-    return {n.id for n in nodes_in(node) if isinstance(n, ast.Name) and isinstance(n.ctx, kind)}
-
-
-NUMBERS = re.compile(r"U?Int\d+|Float\d+|Byte|Char")
-PLACES = re.compile(r"%[-+#0-9.]*[sridxXfFeEgGc]")
 LOGS = re.compile(r"log(debug|info|warn|err|fatal)")
 
 
@@ -205,12 +203,12 @@ def _wrong_arguments(tree: ast.Module, kinds: list[str]) -> Iterator[Argument]:
     functions = {one.name for one in tree.body if isinstance(one, ast.FunctionDef)}
     methods = {f"self.{n.name}" for n in nodes_in(tree) if isinstance(n, ast.FunctionDef)}
     values = [(t, n.value) for n in nodes_in(tree) if isinstance(n, ast.Assign) for t in n.targets]
-    rates = {ast.unparse(target) for target, value in values if _called(value) == "Rate"}
-    published = {ast.unparse(target): kind for target, value in values if (kind := _published_type(value))}
-    yield from _published_nothing(tree)
-    yield from _behind_commas(tree)
+    rates = {ast.unparse(target) for target, value in values if called(value) == "Rate"}
+    published = {ast.unparse(target): kind for target, value in values if (kind := published_type(value))}
+    yield from published_nothing(tree)
+    yield from behind_commas(tree)
     for call in (n for n in nodes_in(tree) if isinstance(n, ast.Call)):
-        name = _called(call)
+        name = called(call)
         owner = ast.unparse(call.func.value) if isinstance(call.func, ast.Attribute) else ""
         if (owner, name) == (f"{rospy}.Rate", "sleep") and call.args and _is_number(call.args[0]):
             why = "`Rate.sleep` needs a Rate that was made, as in `rate.sleep()`"
@@ -220,8 +218,8 @@ def _wrong_arguments(tree: ast.Module, kinds: list[str]) -> Iterator[Argument]:
                 yield Argument([(call, f"{owner}.sleep()")], "a Rate already knows how long to sleep")
         elif name == "publish" and owner:
             kind = published.get(owner, "")
-            yield from _text_of_a_number(call) if NUMBERS.fullmatch(kind) else ()
-            yield from _published_together(call, kind)
+            yield from text_of_a_number(call, variables_of(tree)) if NUMBERS.fullmatch(kind) else ()
+            yield from published_together(call, kind)
         elif _is_rospys(call.func, of_rospy, rospy):
             yield from _logged(call) if LOGS.fullmatch(name) else ()
             yield from _in_quotes(call, name, known)
@@ -238,7 +236,7 @@ def _wrong_arguments(tree: ast.Module, kinds: list[str]) -> Iterator[Argument]:
 def _in_quotes(call: ast.Call, name: str, known: AbstractSet[str]) -> Iterator[Argument]:
     """Of `Publisher('x, String')`, which has its other arguments within the quotes of the first."""
     first = call.args[0] if call.args and name in {"Publisher", "Subscriber", "init_node"} else None
-    begin, comma, rest = first.value.partition(",") if _is_text(first) else ("", "", "")
+    begin, comma, rest = first.value.partition(",") if is_text(first) else ("", "", "")
     inner = tree_of(f"f({rest.strip()})") if comma else ast.Module([], [])
     names = {n.id for n in nodes_in(inner) if isinstance(n, ast.Name)}
     if first is not None and len(inner.body) == 1 and names - {"f"} and names - {"f"} <= known:
@@ -260,7 +258,7 @@ def _without_value(call: ast.Call, name: str, known: AbstractSet[str]) -> Iterat
 def _of_topic(call: ast.Call, types: set[str], kinds: list[str]) -> Iterator[Argument]:
     """Of `Publisher` and `Subscriber`, which take a topic's name and a class."""
     first, second, *_ = [*call.args, None, None]
-    if isinstance(first, ast.Name) and _is_type(first.id, types) and _is_text(second):
+    if isinstance(first, ast.Name) and _is_type(first.id, types) and is_text(second):
         edits: list[tuple[ast.expr, str]] = [(first, repr(second.value)), (second, first.id)]
         yield Argument(edits, "the topic's name comes first, then its type")
         return
@@ -271,7 +269,7 @@ def _of_topic(call: ast.Call, types: set[str], kinds: list[str]) -> Iterator[Arg
         why = f"`{module}` is a module, and no type of messages"
         yield Argument([(given, f"{module}.{of_module[0]}")], why)
     name = ast.unparse(given.func) if isinstance(given, ast.Call) and not given.args else ""
-    if _is_text(given) and _is_type(given.value, types):
+    if is_text(given) and _is_type(given.value, types):
         yield Argument([(given, given.value)], "the type is given as a string")
     elif given is not None and _is_type(name, types):
         yield Argument([(given, name)], f"`{name}()` is a message, not a type")
@@ -289,7 +287,7 @@ def _type_of_topic(call: ast.Call, types: set[str], functions: set[str]) -> Iter
         len(types - {"*"}) == len(types) == 1
         and "data_class" not in named
         and third is None
-        and _is_text(first)
+        and is_text(first)
     ):
         (kind,) = types
         if isinstance(second, ast.Name) and second.id in functions:
@@ -298,123 +296,17 @@ def _type_of_topic(call: ast.Call, types: set[str], functions: set[str]) -> Iter
             yield Argument([(first, f"{ast.unparse(first)}, {kind}")], why)
 
 
-def _published_type(value: ast.expr) -> str:
-    """Return the last name of the type of a `Publisher(…)`; "" of all else."""
-    given = value.args[1:2] if isinstance(value, ast.Call) and _called(value) == "Publisher" else []
-    return ast.unparse(given[0]).rpartition(".")[2] if given else ""
-
-
-def _text_of_a_number(call: ast.Call) -> Iterator[Argument]:
-    """Of `publish(str(n))` on a topic of numbers."""
-    for given in call.args:
-        if isinstance(given, ast.Call) and _called(given) == "str" and len(given.args) == 1:
-            edit = (given, ast.unparse(given.args[0]))
-            yield Argument([edit], "the message takes a number, and `str(…)` makes a string of it")
-
-
-def _published_together(call: ast.Call, kind: str) -> Iterator[Argument]:
-    """Of `publish('a %s', b)`: a message of one field takes one value."""
-    text, values, why = next(iter(call.args), None), call.args[1:], "`publish(…)` takes one value"
-    if NUMBERS.fullmatch(kind) and len(values) == 1 and _is_text(text):
-        yield Argument([(call, f"{ast.unparse(call.func)}({ast.unparse(values[0])})")], why)
-    elif kind == "String" and values and _is_text(text) and _has_no_other_places(text.value, len(values)):
-        yield Argument([(call, f"{ast.unparse(call.func)}({_formatted(text.value, values)})")], why)
-    elif (NUMBERS.fullmatch(kind) or kind == "String") and values and isinstance(text, ast.Name):
-        yield Argument([(call, f"{ast.unparse(call.func)}({text.id})")], why)
-
-
-def _behind_commas(tree: ast.Module) -> Iterator[Argument]:
-    """Of `text = 'a %s', b`, where the text is published."""
-    calls = (n for n in nodes_in(tree) if isinstance(n, ast.Call) and _called(n) in {"publish", "String"})
-    published = {
-        call.args[0].id for call in calls if len(call.args) == 1 and isinstance(call.args[0], ast.Name)
-    }
-    for node in (n for n in nodes_in(tree) if isinstance(n, ast.Assign) and len(n.targets) == 1):
-        target, value = node.targets[0], node.value
-        if not isinstance(value, ast.Tuple) or not isinstance(target, ast.Name) or len(value.elts) < PAIR:
-            continue
-        text, *values = value.elts
-        if target.id in published and _is_text(text) and _has_no_other_places(text.value, len(values)):
-            right = _formatted(text.value, values)
-            yield Argument(
-                [(value, right)], f"the comma makes several values of `{target.id}`, which is to be text"
-            )
-
-
-def _formatted(text: str, values: Sequence[ast.expr]) -> str:
-    """Return how a text is written with these values in it."""
-    given = ", ".join(map(ast.unparse, values))
-    given = given if isinstance(values[0], ast.Name | ast.Call) and not values[1:] else f"({given})"
-    return f"{repr(text) if '%' in text else _with_places(text, len(values))} % {given}"
-
-
-def _has_no_other_places(text: str, count: int) -> bool:
-    """Return whether a text has no `%` at all, or places for so many values and no other `%` (`100%`)."""
-    return "%" not in text or text.count("%") == len(PLACES.findall(text)) == count
-
-
-def _names_beside(function: ast.FunctionDef, call: ast.Call) -> set[str]:
-    """Return the names that the block with a call by itself gives a value."""
-    for node in nodes_in(function):
-        block = getattr(node, "body", [])
-        if isinstance(block, list) and any(isinstance(s, ast.Expr) and s.value is call for s in block):
-            given = (target for s in block if isinstance(s, ast.Assign) for target in s.targets)
-            return {target.id for target in given if isinstance(target, ast.Name)}
-    return set()
-
-
-def _published_nothing(tree: ast.Module) -> Iterator[Argument]:
-    """Yield `publish()`, or a `publish(x)` of a name that is given no value anywhere, where its function gives a value
-    to one name and does nothing with it, or its block to one that nothing else publishes."""
-    known = bound_in(tree) | set(dir(builtins))
-    assigned = (n for n in nodes_in(tree) if isinstance(n, ast.Assign))
-    made = [(ast.unparse(t), _called(n.value)) for n in assigned for t in n.targets]
-    of_others = {"", "self", *(name for name, call in made if call not in ("", "Publisher"))}
-    tools = {name for name, call in made if call in ("Rate", "Publisher", "Subscriber", "Timer")}
-    for function in (n for n in nodes_in(tree) if isinstance(n, ast.FunctionDef)):
-        unread = _names_in(function, ast.Store) - _names_in(function, ast.Load) - tools
-        published = [n for n in nodes_in(function) if isinstance(n, ast.Call) and _called(n) == "publish"]
-        published = [n for n in published if ast.unparse(n.func).rpartition(".")[0] not in of_others]
-        calls = [n for n in published if not n.keywords and _gives_nothing(n, known)]
-        others = {ast.unparse(given) for n in published if n not in calls for given in n.args}
-        beside = _names_beside(function, calls[0]) - others - tools if len(calls) == 1 else set()
-        meant = unread if len(unread) == 1 else beside
-        if len(meant) == len(calls) == 1:
-            given = calls[0].args
-            why = f"nothing gives `{ast.unparse(given[0])}` a value" if given else NOTHING_PUBLISHED
-            yield Argument([(calls[0], f"{ast.unparse(calls[0].func)}({meant.pop()})")], why)
-
-
-NOTHING_PUBLISHED = "there is nothing to publish in the brackets"
-
-
-def _gives_nothing(call: ast.Call, known: AbstractSet[str]) -> bool:
-    """Return whether a call has no argument, or just one name that is given no value anywhere."""
-    first = call.args[0] if len(call.args) == 1 else None
-    return not call.args or (isinstance(first, ast.Name) and first.id not in known and "*" not in known)
-
-
 def _logged(call: ast.Call) -> Iterator[Argument]:
     """Of `loginfo('a', b)`, whose text has no place for the value."""
     text, values = next(iter(call.args), None), call.args[1:]
     value = values[0] if len(values) == 1 else None
-    if text is not None and not _is_text(text) and _is_text(value) and "%" in value.value:
+    if text is not None and not is_text(text) and is_text(value) and "%" in value.value:
         edits = [(text, ast.unparse(value)), (value, ast.unparse(text))]
         yield Argument(edits, "the string comes first, then its values")
-    elif _is_text(text) and values and "%" not in text.value:
+    elif is_text(text) and values and "%" not in text.value:
         right = with_place(repr(text.value)) if len(values) == 1 else ""
         lacks = "no `%` in it" if right else "fewer `%` than there are values after it"
-        yield Argument([(text, _with_places(text.value, len(values)))], f"the string has {lacks}")
-
-
-def _with_places(text: str, count: int) -> str:
-    """Return how a string is written that has places for so many values: those of `.format(…)` become such."""
-    if text.count("{}") == count:
-        return repr(text.replace("{}", "%s"))
-    if count == 1 and (right := with_place(repr(text))):
-        return right
-    blank = "" if not text or text[-1].isspace() else " "
-    return repr(f"{text}{blank}{' '.join(['%s'] * count)}")
+        yield Argument([(text, with_places(text.value, len(values)))], f"the string has {lacks}")
 
 
 def _names_of_objects(tree: ast.Module) -> Iterator[Argument]:
@@ -492,9 +384,9 @@ def _numbers(call: ast.Call, name: str) -> Iterator[Argument]:
     if name == "Publisher" and size is None and third is not None and _is_number(third):
         why = "the third value of `Publisher(…)` is no queue size, which it takes by its name"
         yield Argument([(third, f"queue_size={ast.unparse(third)}")], why)
-    elif _is_text(size) and size.value.isdigit():
+    elif is_text(size) and size.value.isdigit():
         yield Argument([(size, size.value)], "`queue_size` is a string")
-    elif name in {"Rate", "sleep"} and _is_text(first) and first.value.replace(".", "", 1).isdigit():
+    elif name in {"Rate", "sleep"} and is_text(first) and first.value.replace(".", "", 1).isdigit():
         yield Argument([(first, first.value)], f"`rospy.{name}` takes a number, not a string")
     elif name == "Timer" and isinstance(call.func, ast.Attribute) and first is not None and _is_number(first):
         owner = ast.unparse(call.func.value)
@@ -508,7 +400,7 @@ def _callback(call: ast.Call, name: str, functions: set[str]) -> Iterator[Argume
         words = {"callback", "handler", "h"}
         given = [*call.args[place : place + 1], *(k.value for k in call.keywords if k.arg in words)]
         for one in given:
-            if _is_text(one) and one.value in functions:
+            if is_text(one) and one.value in functions:
                 yield Argument([(one, one.value)], f"'{one.value}' is a string, not a function")
 
 
@@ -555,11 +447,6 @@ def _imported(tree: ast.Module, ending: str) -> set[str]:
     return {a.asname or a.name for names in named for a in names}
 
 
-def _called(node: ast.AST | None) -> str:
-    """Return the last name of what is called; "" where nothing is."""
-    return last_name(node.func) if isinstance(node, ast.Call) else ""
-
-
 def _is_rospys(function: ast.expr, of_rospy: set[str], rospy: str) -> bool:
     if isinstance(function, ast.Attribute):
         return isinstance(function.value, ast.Name) and function.value.id == rospy
@@ -568,14 +455,6 @@ def _is_rospys(function: ast.expr, of_rospy: set[str], rospy: str) -> bool:
 
 def _is_type(name: str, types: set[str]) -> bool:
     return name in types or ("*" in types and name.isidentifier() and name[:1].isupper())
-
-
-class _Text(ast.Constant):
-    value: str
-
-
-def _is_text(node: ast.expr | None) -> TypeGuard[_Text]:
-    return isinstance(node, ast.Constant) and isinstance(node.value, str)
 
 
 def _is_number(node: ast.expr) -> bool:
