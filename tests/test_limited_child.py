@@ -38,6 +38,7 @@ OF_REPAIRS = {
     "package.python_repairs.calls",
     "package.python_repairs.examine",
     "package.python_repairs.imports",
+    "package.python_repairs.lines_outside",
     "package.python_repairs.lost_heads",
     "package.python_repairs.members",
     "package.python_repairs.names",

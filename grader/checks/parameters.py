@@ -27,6 +27,7 @@ from grader.checks.support.parameters import (
 from grader.checks.support.processes import (
     GlobalName,
     first_interrupt_ns,
+    is_written_as,
     lives,
     named_at,
     not_started,
@@ -294,6 +295,11 @@ def _never_set(
     if copied and not others:
         why = f"line {copied[0].line} of {copied[0].file} changes `{copied[0].name}`, which is the script's own copy"
         return failed(f"{params.name} is never set: {why}", hint=copied[0].fix, citations=(copied[0].place,))
+    gets = [s for s in run_slips(package, run, "read-to-set") if is_written_as(s.message, params.name)]
+    gets = [s for s in gets if _is_value(s.name, params.value)]
+    if gets and not others:
+        why = f"on line {gets[0].line} of {gets[0].file}, `get_param(…)` only reads: a second value is its default"
+        return failed(f"{params.name} is never set: {why}", hint=gets[0].fix, citations=(gets[0].place,))
     instead = f"; the node sets {join_words(others)}" if others else ""
     cited = named_at(package, run, "sets-parameter", next(iter(others))) if len(others) == 1 else ()
     hint = f"write {set_param(params.name, params.value)}"

@@ -277,7 +277,9 @@ def concerns(
 
 def _is_of_words(repair: Repair) -> bool:
     """Return whether the repair changes no more than what a line prints: its `%`, or the `f` in front of its text."""
-    prints = re.search(r"\b(?:print|log\w+|write)\s*\(", repair.before) is not None
+    prints = (
+        "\n" not in repair.before and re.search(r"\b(?:print|log\w+|write)\s*\(", repair.before) is not None
+    )
     no_f = prints and re.sub(r"""\bf(?=["'])""", "", repair.after, count=1) == repair.before
     told, right = (re.sub(r"""%[sdf]|["'\s]""", "", text) for text in (repair.before, repair.after))
     return no_f or (prints and told == right) or repair.before.replace("+", "%", 1) == repair.after
@@ -496,7 +498,11 @@ def _moving(repairs: Sequence[Repair]) -> list[Repair]:
     return [
         one.model_copy(update={"file": renamed.get(one.file, one.file)})
         for one in repairs
-        if one.kind not in WHOLE_FILES and one.before.count("\n") != one.after.count("\n")
+        if one.kind not in WHOLE_FILES
+        and (
+            one.before.count("\n") != one.after.count("\n")
+            or (one.before != one.after and sorted(one.before.split("\n")) == sorted(one.after.split("\n")))
+        )
     ]
 
 

@@ -20,7 +20,7 @@ SlipKind = Literal[
     "printed-in-part", "published-in-part", "never-published", "takes-number", "typed-text", "goes-on",
     "no-argument", "read-late", "debugger", "drops-result", "returns-list", "fills", "catches", "no-result",
     "stuck", "runs-out", "base-unmade", "rate-as-time", "frames", "changes-copy", "step-number", "keeps-rate",
-    "way-number",
+    "way-number", "read-to-set",
 ]  # fmt: skip
 
 
@@ -135,6 +135,8 @@ class PythonSlip(Placed, Record):
     - `sets-parameter`: where it sets a parameter.
     - `changes-copy`: where a map that was read from the parameter server, `name`, gets another value for the parameter
       `message`, and nothing sets that map there.
+    - `read-to-set`: where `get_param(…)` gets a value, `name`, besides the name of a parameter, `message`, as
+      `set_param(…)` does (`fix`).
     - `ranges-read`: which ranges of a scan it reads there (`90`, `-30:`, `n//2-9:` with `n` for their count); only
       where it reads no others.
     - `argument-text`: where an argument of the command line is kept as a text; `fix` is the line with a number in its

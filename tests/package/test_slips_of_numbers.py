@@ -586,3 +586,16 @@ def test_numbers_that_say_how_far_or_how_long_are_known(tmp_path, code, told):
     (tmp_path / "a.py").write_text(code)
     slips = [s for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "way-number"]
     assert [(s.message, s.fix, s.name) for s in slips] == told
+
+
+@pytest.mark.parametrize(
+    ("code", "told"),
+    [
+        ("rospy.get_param('/a', 5)\n", ["on line 1, write `rospy.set_param('/a', 5)`"]),
+        ("p = rospy.get_param('/a', default='5')\n", ["above line 1, write `rospy.set_param('/a', '5')`"]),
+        ("rospy.get_param('/a')\nrospy.get_param('/a', n)\n", []),
+    ],
+)
+def test_a_parameter_that_is_read_with_the_value_to_set(code: str, told: list[str], tmp_path: Path) -> None:
+    (tmp_path / "a.py").write_text(code)
+    assert [s.fix for s in check_syntax(tmp_path, ["a.py"]).slips if s.kind == "read-to-set"] == told

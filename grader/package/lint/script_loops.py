@@ -234,7 +234,10 @@ def stopped_loops(tree):
         ending = loop_ends(loop.test) if isinstance(loop, ast.While) else None
         for spin in calls_in(loop, "spin")[:1]:
             message = "the loop stops at the spin() on line %d, which waits until the node ends" % spin.lineno
+            slept = [dotted(n.targets[0]) for n in all_of(tree, ast.Assign) if is_call(n.value, "Rate")]
             fix = "remove spin(): the loop keeps the node alive"
+            if slept and not calls_in(loop, "sleep"):
+                fix = "on line %d, write `%s.sleep()` in place of spin()" % (spin.lineno, slept[-1])
             yield slip(spin.lineno, "spin-in-loop", message, fix)
         # of what the node does; a robot's may stay alive in `spin()` once it has arrived
         spins = is_robot and any(calls_in(one, "spin") for one in run_after(loop, tree))

@@ -116,6 +116,18 @@ def changed_copies(tree):
             yield slip(node.lineno, "changes-copy", path, fix, name)
 
 
+def read_to_set(tree):
+    """Yield where `get_param` gets a value besides the name, as `set_param` does: what is meant may be to set it."""
+    for call in calls_in(tree, "get_param"):
+        names, values = argument(call, 0, "param_name"), argument(call, 1, "default")
+        if names and values and text_of(names[0]) and isinstance(values[0], ast.Constant):
+            name, value = text_of(names[0]), values[0].value
+            alone = any(node.value is call for node in all_of(tree, ast.Expr))
+            where = "on line %d, write" if alone else "above line %d, write"
+            fix = (where + " `rospy.set_param(%r, %r)`") % (call.lineno, name, value)
+            yield slip(call.lineno, "read-to-set", name, fix, str(value))
+
+
 def is_of_messages(module):
     return ".%s" % (module or "").rpartition(".")[2] in (".msg", ".srv")
 

@@ -83,7 +83,7 @@ def slips(tree, numbers=()):
         values.kept_velocities, values.values_never_set_back, values.emptied_files,
         script_prints.unprinted_messages, clocks.values_left_out, clocks.published_unchanged,
         unsent.unused_publishers, unsent.unsent_messages, unsent.changed_copies, unsent.lost_objects,
-        rates.loops_of_numbers,
+        unsent.read_to_set, rates.loops_of_numbers,
         goals.finished_goals, goals.finished_in_loops, goals.ended_without_result, clocks.sends_no_time, without_node,
         debuggers, script_results.results, rates.turns_taken_off, script_bases.unmade_bases, script_threads.waits,
         calls.calls_of_roscpp, calls.locks_taken_twice, calls.values_out_of_order, calls.params_read_early,

@@ -11,7 +11,7 @@ from __future__ import annotations
 import ast
 import builtins
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from collections.abc import Set as AbstractSet
 from itertools import chain, pairwise
 
@@ -191,6 +191,58 @@ def with_lines_turned(text: str) -> Iterator[Step]:
                 after = "\n".join([*lines[:at], lines[at + 1], lines[at], *lines[at + 2 :]])
                 yield from step_to("turned", first.lineno, text, after)
                 return
+
+
+def with_definitions_first(text: str) -> Iterator[Step]:
+    """Functions or classes that a line of the file needs above them: they move up; the line moves down if it is the
+    only one that does anything."""
+    tree, lines = tree_of(text), text.split("\n")
+    known = set(dir(builtins))
+    for place, first in enumerate(tree.body):
+        if isinstance(first, DEFINITIONS):
+            continue
+        known |= bound_in(ast.Module(tree.body[:place], []))
+        below = tree.body[place + 1 :]
+        needed = _needed_now(first, tree.body[:place]) - known
+        late = [i for i, one in enumerate(below) if isinstance(one, DEFINITIONS) and one.name in needed]
+        between = below[late[0] : late[-1] + 1] if late else []
+        if not late or not all(isinstance(one, DEFINITIONS) for one in between):
+            continue
+        at, end = first.lineno - 1, first.end_lineno or 0
+        if all(isinstance(one, DEFINITIONS) for one in below):
+            moved, until = lines[at:end], below[-1].end_lineno or 0
+            after = [*lines[:at], *lines[end:until], "", "", *moved, *lines[until:]]
+            moving = f"{first.lineno} {end} below {until}"
+        else:
+            begin, until = _first_line(between[0]) - 1, between[-1].end_lineno or 0
+            after = [*lines[:at], *lines[begin:until], *lines[at:begin], *lines[until:]]
+            moving = f"{begin + 1} {until} above {first.lineno}"
+        names = " ".join(
+            one.name for i, one in enumerate(below) if i in late and isinstance(one, DEFINITIONS)
+        )
+        yield from step_to("defined", first.lineno, text, "\n".join(after), f"{moving} {names}")
+        return
+
+
+DEFINITIONS = (ast.FunctionDef, ast.ClassDef)
+
+
+def _first_line(node: ast.stmt) -> int:
+    """Return the line on which a definition begins, with what decorates it."""
+    return min([node.lineno, *(one.lineno for one in getattr(node, "decorator_list", []))])
+
+
+def _needed_now(statement: ast.stmt, above: Sequence[ast.stmt]) -> set[str]:
+    """Return the names that a statement reads, and the functions above it that it names; not what a lambda will."""
+    functions = {one.name: one for one in above if isinstance(one, ast.FunctionDef)}
+    later = {inner for n in nodes_in(statement) if isinstance(n, ast.Lambda) for inner in nodes_in(n.body)}
+    names = [n for n in nodes_in(statement) if isinstance(n, ast.Name) and n not in later]
+    found, new = set[str](), {n.id for n in names if isinstance(n.ctx, ast.Load)}
+    while new:
+        found |= new
+        called = [names_in(functions[name], ast.Load) for name in new if name in functions]
+        new = set[str]().union(*called) - found
+    return found
 
 
 LOGS = re.compile(r"log(debug|info|warn|err|fatal)")

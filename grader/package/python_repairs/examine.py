@@ -23,6 +23,7 @@ from grader.package.python_repairs.calls import (
     with_arguments,
     with_callbacks,
     with_calls,
+    with_definitions_first,
     with_lines_turned,
     with_publish_uncommented,
     with_quoted_calls,
@@ -34,6 +35,7 @@ from grader.package.python_repairs.imports import (
     with_message_classes,
     without_suffixes,
 )
+from grader.package.python_repairs.lines_outside import LOOPED, with_lines_inside
 from grader.package.python_repairs.lost_heads import lost_head, lost_method
 from grader.package.python_repairs.members import Known, with_members
 from grader.package.python_repairs.names import (
@@ -75,7 +77,6 @@ from grader.wording import is_one_edit
 OLD_NAMES = {"raw_input": "input", "xrange": "range", "unicode": "str", "basestring": "str", "unichr": "chr"}
 WAITING = frozenset({"Subscriber", "Service", "Timer", "SimpleActionServer"})
 """What a node that only waits is made of."""
-LOOPED = frozenset({"is_shutdown", "sleep", "spin"})
 HOLDING_NAMES = (
     "exec_ execute join main mainloop pause rosrun rostest run run_forever run_until_complete send_goal_and_wait "
     "serve_forever show unitrun wait wait_for_result Thread"
@@ -154,7 +155,8 @@ def _steps(text: str, types: list[str], known: Known, node: str, *, is_run: bool
             lambda t: with_arguments(t, types),
             with_globals,
             with_lines_turned,
-            _with_lines_inside,
+            with_definitions_first,
+            with_lines_inside,
             _with_start,
             with_node_first,
             *((_with_main, lambda t: with_init(t, node), _with_server_started, _with_spin) if is_run else ()),
@@ -349,35 +351,6 @@ COMMENTED_HEAD = re.compile(r"(\s*)#[#\s]*((?:def|class)\s+(\w+).*:)\s*$")
 
 BLOCKS_MAX, BLANK_LINES = 40, 2
 """So many blocks are searched; so many blank lines stand between a function and what comes after it (PEP 8)."""
-
-
-def _with_lines_inside(text: str) -> Iterator[Step]:
-    """`rospy.spin()`, or a loop, right below the function that makes the node, and outside of it."""
-    tree, lines = tree_of(text), text.split("\n")
-    shared = {name for one in tree.body for name in bound_in(one) if _is_plain(one)}
-    for function, below in pairwise(tree.body):
-        if not isinstance(function, ast.FunctionDef) or below.lineno != (function.end_lineno or 0) + 1:
-            continue
-        calls = {last_name(n.func) for n in nodes_in(function) if isinstance(n, ast.Call)}
-        own = bound_in(function) - shared
-        used = {n.id for n in nodes_in(below) if isinstance(n, ast.Name)}
-        called = (
-            below.value.func if isinstance(below, ast.Expr) and isinstance(below.value, ast.Call) else None
-        )
-        spins = called is not None and last_name(called) == "spin"
-        loops = isinstance(below, ast.While) and bool(own & used)
-        if "init_node" in calls and not calls & LOOPED and (spins or loops):
-            first, end = below.lineno - 1, below.end_lineno or below.lineno
-            above = lines[function.body[-1].lineno - 1]
-            blanks = above[: function.body[-1].col_offset]  # tabs, or spaces
-            moved = [blanks + line for line in lines[first:end]]
-            after = "\n".join([*lines[:first], *moved, *lines[end:]])
-            yield from step_to("inside", below.lineno, text, after, function.name)
-            return
-
-
-def _is_plain(statement: ast.stmt) -> bool:
-    return not isinstance(statement, ast.FunctionDef | ast.ClassDef)
 
 
 def _with_main(text: str) -> Iterator[Step]:

@@ -24,7 +24,7 @@ from grader.model.record import Record
 from grader.model.repair import ASKED, Repair, RepairKind, as_code
 from grader.package.python import TOO_FAR_IN, reason_of
 from grader.package.repairs.editing import KEEP_ONE, Files, emptied_lines
-from grader.wording import convert, is_one_edit, join_words, numbers_text, on_lines, plural
+from grader.wording import convert, is_one_edit, join_words, lines_text, numbers_text, on_lines, plural
 
 EXAMINE = "grader.package.python_repairs.examine:examine"
 TURN = "grader.package.python_repairs.examine:with_sign_turned"
@@ -38,12 +38,12 @@ ATTEMPTS = 3
 Cause = Literal[
     "merged", "tabs", "level", "indent", "braces", "commented", "python2", "characters", "token", "global", "outside",
     "old-name", "module", "other-module", "import", "name", "quotes", "attribute", "value", "time", "call", "quoted",
-    "comment", "callback", "argument", "unbound", "kept", "guard", "inside", "start", "late", "main", "init", "server",
-    "spin", "line", "twice", "turned", "empty", "emptied",
+    "comment", "callback", "argument", "unbound", "kept", "defined", "guard", "inside", "start", "late", "main", "init",
+    "server", "spin", "line", "twice", "turned", "empty", "emptied",
 ]  # fmt: skip
 CALLS = (
     "name", "quotes", "attribute", "value", "time", "call", "quoted", "comment", "callback", "argument", "unbound",
-    "kept", "guard", "inside", "start", "late", "main", "init", "server", "spin",
+    "kept", "defined", "guard", "inside", "start", "late", "main", "init", "server", "spin",
 )  # fmt: skip
 KINDS: dict[str, RepairKind] = {
     **dict.fromkeys(("module", "other-module", "import"), "missing-import"),
@@ -450,6 +450,13 @@ def _words(file: str, cause: Cause, steps: list[_Step], before: str) -> tuple[st
     error, word, place = first.error, first.word, f"line {first.line} of {file}"
     if cause in {"unbound", "kept"}:
         return _shared_variables(place, cause, word.split(", "))
+    if cause == "defined":
+        first_line, last_line, where, other, *names = word.split()
+        they = f"{join_words(f'`{name}`' for name in names)} {'is' if len(names) == 1 else 'are'} defined only below it"
+        return (
+            f"{place}: {they}",
+            f"move {lines_text(int(first_line) - 1, int(last_line) - 1)} {where} line {other}",
+        )
     if cause not in WORDS:
         reason = reason_of(error.message, error.text, column=error.column) if error else Reason()
         fix = _rewritten(before, after) if cause == "python2" else ""
@@ -525,7 +532,7 @@ WORDS: dict[Cause, tuple[str, str]] = {
     "twice": ("{place}: this line repeats the one above", "delete line {line}"),
     "turned": ("lines {line} and {below} of {file} are the wrong way round", "write line {below} above line {line}"),
     "start": ("{place}: the lines from here on belong to {calls}, so nothing runs them", ""),
-    "inside": ("{place}: from here on the lines are outside of {calls}, which makes the node",
+    "inside": ("{place}: from here on the lines are outside of {calls}, to which they belong",
      "change the indentation: "),
     "late": ("{place} uses ROS before `rospy.init_node(…)`",
      "move `rospy.init_node(…)` from line {word} up, above line {line}"),
