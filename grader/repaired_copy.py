@@ -35,9 +35,9 @@ from grader.model.verdict import FileCitation
 from grader.package.manifest import parse_manifest
 from grader.package.repairs import NotRepairable, apply_repair, find_repairs, wanted_of
 from grader.package.repairs.editing import read_data
-from grader.package.repairs.python import conversions, ros_clock, text_place, turn_sign
+from grader.package.repairs.of_runs import repairs_by_hint
+from grader.package.repairs.python import ros_clock, turn_sign
 from grader.rubric.model import Rubric
-from grader.wording import CONVERTED, TEXT_PLACE
 
 STEERS_WRONG, WARPED = "steers-wrong", "warped"
 REPAIRS_MAX = 4
@@ -99,16 +99,13 @@ def choose_repairs(
 def _of_errors(
     submission: Submission, criteria: Sequence[CriterionResult], found: Collection[Repair]
 ) -> Iterator[Repair]:
-    """Yield the repairs of what only a run shows: that a value is of another type than is needed on a line."""
+    """Yield the repairs of what only a run shows: of a value's or a topic's type, or of a loop's rate."""
     known = {(one.file, one.line) for one in found}
     for criterion in (one for one in criteria if one.status.is_lost and not one.blocked_by):
         cited = next((one for one in criterion.citations if isinstance(one, FileCitation)), None)
         if cited is None or cited.line is None or cited.file.startswith("../"):
             continue
-        place = (submission.package.folder, cited.file, cited.line)
-        told = CONVERTED.search(criterion.hint)
-        repairs = conversions(*place, told[1], told[2]) if told else []
-        for repair in text_place(*place) if TEXT_PLACE in criterion.hint else repairs:
+        for repair in repairs_by_hint(submission.package.folder, criterion.hint, cited.file, cited.line):
             if (repair.file, repair.line) not in known:
                 known.add((repair.file, repair.line))
                 yield repair

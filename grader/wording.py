@@ -223,3 +223,20 @@ CONVERTED = re.compile(r"write `(str|int|float)\(([^`]+)\)` instead of `\2`")
 def convert(function: str, value: str) -> str:
     """Return the hint on a value of another type than is needed: ``write `str(n)` instead of `n` ``."""
     return f"write `{function}({value})` instead of `{value}`"
+
+
+ASKED_RATE = re.compile(r"make it \S+ Hz in ([^:;]+\.py), line (\d+): use ([\w.]+\([\d.]+\))")
+"""The file, the line and the call in a hint of `ask_rate`."""
+ASKED_TYPE = re.compile(r"use (\w+)/(\w+), the type that the handout asks for")
+"""The package and the name in a hint of `ask_type`."""
+
+
+def ask_rate(hz: str, where: str, right: str) -> str:
+    """Return the hint on a line that asks for another rate: `make it 10 Hz in a.py, line 3: use rospy.Rate(10)`."""
+    return f"make it {hz} Hz in {where}: use {right}"
+
+
+def ask_type(name: object) -> str:
+    """Return the hint on a topic's type: `use std_msgs/String, the type that the handout asks for`."""
+    wanted = f"{name}, the type" if isinstance(name, str) else "the type"
+    return f"use {wanted} that the handout asks for"

@@ -213,13 +213,14 @@ def params_set(package: PackageFacts, run: Run, params: ParamsSetParams) -> Verd
     How it is measured
         By every change of the parameter server up to Ctrl-C or the node's own end. The value may be a
         number or text. Once it is set, the parameter itself, the unchanged others and the printed value
-        earn equal shares.
+        earn equal shares. If the student's file has another name for a parameter, which another criterion
+        judges, the node may set that one.
 
     How to fix
         `rospy.set_param('/details/contact/phone', 55555)`: use the full name of the one value, never a map.
         Read it back with `rospy.get_param` and log it.
     """
-    until_ns = _until_ns(run)
+    params, until_ns = _as_in_file(run, params), _until_ns(run)
     after = params_on_server(run, until_ns=until_ns)
     got = after.get(params.name)
     others = f", {join_words(params.unchanged)} as before" if params.unchanged else ""
@@ -232,6 +233,20 @@ def params_set(package: PackageFacts, run: Run, params: ParamsSetParams) -> Verd
     cited = cite(run, "/grader/param")
     measured = f"{params.name}: {'not there' if got is None else shown(str(got))}"
     return verdict.about(expected=expected, measured=measured, citations=(cited,))
+
+
+def _as_in_file(run: Run, params: ParamsSetParams) -> ParamsSetParams:
+    """Return the parameters by the names that the student's file has for them, where the node sets the one of these."""
+    in_file = [name for name, one in params_given(run).items() if one.in_file]
+    own = {
+        absolute_name(e.name) for _, e in run.params if e.action == "set" and run.is_student_node(e.caller_id)
+    }
+    names = (params.name, *params.unchanged)
+    places = {n: n if n in in_file else name_in_its_place(n, in_file, names) or n for n in names}
+    if params.name in own or places[params.name] not in own:
+        return params
+    unchanged = tuple(places[name] for name in params.unchanged)
+    return params.model_copy(update={"name": places[params.name], "unchanged": unchanged})
 
 
 def _set_in_part(

@@ -42,7 +42,7 @@ from grader.model.message_rate import ROUNDING, RateBounds, Rhythm
 from grader.model.package import PackageFacts
 from grader.model.python_slip import PythonSlip, SlipKind
 from grader.model.verdict import Status, Verdict, failed, failed_or_blocked, grade_again, inconclusive, passed
-from grader.wording import hertz, join_words, plural, seconds, significant
+from grader.wording import ask_rate, hertz, join_words, plural, seconds, significant
 
 FLOOD_FACTOR = 5
 FLOOD_HZ = 500.0
@@ -473,7 +473,7 @@ def _with_line(verdict: Verdict, slip: PythonSlip, params: RateParams) -> Verdic
         said = f" {'waits for a time' if slip.name else 'asks for a rate'} drawn by {slip.message}(…)"
     hz, period_s = significant(params.rate_hz), significant(1 / params.rate_hz)
     right = f"{slip.name}({period_s})" if slip.name else loop_rate(hz)
-    return verdict.explained(f"{where}{said}", f"make it {hz} Hz in {where}: use {right}", (slip.place,))
+    return verdict.explained(f"{where}{said}", ask_rate(hz, where, right), (slip.place,))
 
 
 def _slips(run: Run, package: PackageFacts, params: RateParams, *kinds: SlipKind) -> list[PythonSlip]:

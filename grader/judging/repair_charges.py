@@ -21,13 +21,15 @@ from grader.model.repair import Repair, advice_on, messages_of, place_of
 from grader.model.result import CriterionResult
 from grader.model.verdict import Citation, FileCitation, Status, Verdict, cited_lines, failed, share_text
 from grader.rubric.model import Criterion, Rubric
-from grader.wording import join_words
+from grader.wording import ASKED_TYPE, join_words
 
 BUILD, INSTALL = "build", "cmake-install"
 OF_EXCEPTIONS = "callbacks-clean"
 """The check that asks for what others are lost by where a callback fails."""
 OF_PACKAGES = {MANIFEST, CMAKE}
 
+OF_RATES = "loop-rate"
+"""The rate's own criteria keep their loss, and no other is charged."""
 NAMES = {
     "topic-name",
     "service-name",
@@ -73,7 +75,7 @@ def charge_repairs(
     criteria = [by_id[name] for name in order if name in better]
     criteria.sort(key=lambda c: c.check != OF_EXCEPTIONS)
     criteria_of_runs = [c for c in rubric.criteria if c.scenario is not None and c.points > 0]
-    needed = dict.fromkeys(one for repairs in needs.values() for one in repairs)
+    needed = dict.fromkeys(one for repairs in needs.values() for one in repairs if one.kind != OF_RATES)
     # Names first: `misnamed` keeps other repairs from their criteria.
     for repair in sorted(needed, key=lambda one: one.kind not in NAMES):
         if repair.kind == "ros-clock" and not any(
@@ -368,6 +370,8 @@ def is_told(repair: Repair, hint: str) -> bool:
     """Return whether the check's own hint says how this is repaired: how git learns of a bit, what has a name."""
     if repair.kind == "executable-bit":
         return repair.file in hint and "chmod" in hint
+    if repair.kind == "message-type":
+        return ASKED_TYPE.search(hint) is not None
     if IN_PLACE_OF_ALL in hint and PurePosixPath(repair.file).name == CMAKE:
         return True
     if repair.kind == "parameter-name" and repair.before.strip() == repair.after.strip():

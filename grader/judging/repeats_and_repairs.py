@@ -247,11 +247,10 @@ def concerns(
     none that only installs scripts, which the criterion of installing asks for.
     """
     if criterion.scenario is not None:
-        sleeps = repair.before.endswith(".sleep") and repair.after == f"{repair.before}()"
-        words = repair.kind == "missing-call" and _is_of_words(repair)
-        of_others = AT_ANY_RATE if sleeps else OF_ANY_WORDS if words else set[str]()
         at_end = repair.message.endswith(AT_THE_END)
-        is_other = criterion.check in of_others or (at_end and criterion.check != "node-lives")
+        is_other = criterion.check in _checks_of_others(repair) or (
+            at_end and criterion.check != "node-lives"
+        )
         return not is_other and is_used_by(
             rubric.scenarios[criterion.scenario], repair, rubric, built=built, launched=launched
         )
@@ -273,6 +272,15 @@ def concerns(
     return repair.kind not in repair_charges.OF_BUILDS and repair_charges.asks_for(
         found[criterion.id], repair
     )
+
+
+def _checks_of_others(repair: Repair) -> Collection[str]:
+    """Return the checks of runs that do not depend on what was repaired, or judge it as it is."""
+    if repair.kind == "loop-rate":
+        return {"rate"}
+    if repair.before.endswith(".sleep") and repair.after == f"{repair.before}()":
+        return AT_ANY_RATE
+    return OF_ANY_WORDS if repair.kind == "missing-call" and _is_of_words(repair) else ()
 
 
 def _is_of_words(repair: Repair) -> bool:

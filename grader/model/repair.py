@@ -17,7 +17,7 @@ RepairKind = Literal[
     "executable-bit", "encoding", "byte-order-mark", "line-ends", "shebang", "file-name", "python-syntax",
     "manifest-line", "build-line", "launch-syntax", "yaml-syntax", "package-name", "launch-type", "missing-import",
     "missing-call", "node-name", "topic-name", "service-name", "parameter-name", "ros-clock", "turn-sign",
-    "exchanged-files",
+    "exchanged-files", "message-type", "loop-rate",
 ]  # fmt: skip
 """In the order in which a student would meet them."""
 
@@ -53,6 +53,8 @@ BY_HAND: dict[RepairKind, str] = {
     "ros-clock": "time by the computer's clock: a simulator sets ROS's, which rospy.get_time() and rospy.sleep(…) use",
     "turn-sign": "a turn to the wrong side: a positive angular.z turns to the left",
     "exchanged-files": "two scripts that hold each other's code: exchange the two files",
+    "message-type": "a subscriber with another type than its topic: rostopic info shows the type",
+    "loop-rate": "a loop or a timer with another rate: rostopic hz shows it",
 }
 """How a mistake of this kind looks, and how it is repaired."""
 

@@ -17,7 +17,8 @@ from grader.package.python_repairs.syntax import Step, step_to
 from grader.package.repairs import NotRepairable, apply_repair, find_repairs
 from grader.package.repairs.editing import changed_lines
 from grader.package.repairs.names import is_near, is_one_edit
-from grader.package.repairs.python import conversions, ros_clock, text_place
+from grader.package.repairs.of_runs import conversions, text_place
+from grader.package.repairs.python import ros_clock
 from grader.repaired_copy import REPAIRS_MAX, most_of
 from tests.package.repairing import (
     CMAKE,

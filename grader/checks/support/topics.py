@@ -53,7 +53,7 @@ from grader.model.verdict import (
     grade_again,
     inconclusive,
 )
-from grader.wording import NOTHING_TO_DO, join_words
+from grader.wording import NOTHING_TO_DO, ask_type, join_words
 
 SYSTEM_TOPICS = frozenset({"/rosout", "/rosout_agg", "/clock"})
 End = Literal["publishers", "subscribers"]
@@ -362,8 +362,7 @@ def refused_type(run: Run, topic: str, package: PackageFacts | None = None) -> V
     # The same name was refused, so it is the fields that differ.
     other = f"another definition of {asked.type}" if asked.type == asked.value else asked.type
     message = f"{asked.actor} subscribes to {topic} with {other}, so nothing arrives"
-    wanted = f"{asked.value}, the type" if isinstance(asked.value, str) else "the type"
-    hint = f"in {subscriber(topic)}, use {wanted} that the handout asks for"
+    hint = f"in {subscriber(topic)}, {ask_type(asked.value)}"
     if isinstance(asked.value, str) and "/" in asked.value and asked.type != asked.value:
         of_types, _, name = asked.value.partition("/")
         hint = f"{hint}, with `{imports(of_types, name, 'msg')}` at the top"

@@ -229,7 +229,8 @@ DEFINITIONS = (ast.FunctionDef, ast.ClassDef)
 
 def _first_line(node: ast.stmt) -> int:
     """Return the line on which a definition begins, with what decorates it."""
-    return min([node.lineno, *(one.lineno for one in getattr(node, "decorator_list", []))])
+    decorators = node.decorator_list if isinstance(node, DEFINITIONS) else []
+    return min([node.lineno, *(one.lineno for one in decorators)])
 
 
 def _needed_now(statement: ast.stmt, above: Sequence[ast.stmt]) -> set[str]:

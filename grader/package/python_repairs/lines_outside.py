@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterator
+from collections.abc import Set as AbstractSet
 from itertools import takewhile
 
 from grader.package.python_repairs.names import bound_in
@@ -45,7 +46,7 @@ def _is_spin(statement: ast.stmt, function: ast.FunctionDef) -> bool:
     return spins and statement.lineno == (function.end_lineno or 0) + 1
 
 
-def _needs(loop: ast.While, function: ast.FunctionDef, own: set[str]) -> bool:
+def _needs(loop: ast.While, function: ast.FunctionDef, own: AbstractSet[str]) -> bool:
     """Return whether a loop reads what only a function has that needs no arguments, and so is no callback."""
     used = {n.id for n in nodes_in(loop) if isinstance(n, ast.Name)}
     return bool(own & used) and len(function.args.args) == len(function.args.defaults)

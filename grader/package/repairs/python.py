@@ -24,7 +24,7 @@ from grader.model.record import Record
 from grader.model.repair import ASKED, Repair, RepairKind, as_code
 from grader.package.python import TOO_FAR_IN, reason_of
 from grader.package.repairs.editing import KEEP_ONE, Files, emptied_lines
-from grader.wording import convert, is_one_edit, join_words, lines_text, numbers_text, on_lines, plural
+from grader.wording import is_one_edit, join_words, lines_text, numbers_text, on_lines, plural
 
 EXAMINE = "grader.package.python_repairs.examine:examine"
 TURN = "grader.package.python_repairs.examine:with_sign_turned"
@@ -282,37 +282,6 @@ def turn_sign(folder: Path, file: str, side: str = "") -> Repair | None:
             why = "this turn has the wrong sign: a copy of the package with the other sign passes"
         files.change("turn-sign", file, step["text"], f"line {step['line']} of {file}: {why}")
     return next(iter(files.repairs), None)
-
-
-def conversions(folder: Path, file: str, line: int, function: str, value: str) -> list[Repair]:
-    """Return the repairs that put `value` into `str(…)` or the like at the line where a run ended of its type, and on
-    the other lines of the script that join it to a text."""
-    files = Files(folder=folder.resolve())
-    name, right = rf"(?<![\w.]){re.escape(value)}(?![\w.(\[])", f"{function}({value})"
-    joined = re.compile(rf"[\"']\s*\+\s*{name}")
-    for number, code in enumerate((files.text(file) or "").split("\n"), start=1):
-        is_other = function == "str" and joined.search(code)
-        if (number == line or is_other) and len(re.findall(name, code)) == 1:
-            lines = (files.text(file) or "").split("\n")
-            lines[number - 1] = re.sub(name, lambda _: right, code)
-            message = f"line {number} of {file}: `{value}` is of another type than is needed here"
-            files.change("missing-call", file, "\n".join(lines), message, convert(function, value))
-    return list(files.repairs)
-
-
-NUMBER_PLACE = re.compile(r"%[-+ #0-9.]*[dif](?!\w)")
-
-
-def text_place(folder: Path, file: str, line: int) -> list[Repair]:
-    """Return the repair that makes `%s` of the only `%d` or `%f` of a line at which a run ended, as a text came."""
-    files = Files(folder=folder.resolve())
-    lines = (files.text(file) or "").split("\n")
-    found = NUMBER_PLACE.findall(lines[line - 1]) if line <= len(lines) else []
-    if len(found) == 1:
-        lines[line - 1] = lines[line - 1].replace(found[0], "%s")
-        message = f"line {line} of {file}: `{found[0]}` takes a number, and gets a text"
-        files.change("missing-call", file, "\n".join(lines), message, f"write `%s` instead of `{found[0]}`")
-    return list(files.repairs)
 
 
 def ros_clock(folder: Path, file: str) -> Repair | None:

@@ -1,0 +1,99 @@
+"""Repairs of what only a run shows: a value or a message of another type, or a loop's rate.
+
+The line is known by what a criterion cites or says, and what to write there by its hint (`grader/wording.py`).
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from grader.model.repair import Repair
+from grader.package.repairs.editing import Files
+from grader.wording import ASKED_RATE, ASKED_TYPE, CONVERTED, TEXT_PLACE, convert
+
+
+def repairs_by_hint(folder: Path, hint: str, file: str, line: int) -> list[Repair]:
+    """Return the repairs of a lost criterion that cites this line first."""
+    if (rate := ASKED_RATE.search(hint)) is not None:
+        return loop_rate(folder, rate[1], int(rate[2]), rate[3])
+    if (asked := ASKED_TYPE.search(hint)) is not None:
+        return message_type(folder, file, line, asked[1], asked[2])
+    if TEXT_PLACE in hint:
+        return text_place(folder, file, line)
+    told = CONVERTED.search(hint)
+    return conversions(folder, file, line, told[1], told[2]) if told else []
+
+
+def conversions(folder: Path, file: str, line: int, function: str, value: str) -> list[Repair]:
+    """Return the repairs that put `value` into `str(…)` or the like at the line where a run ended of its type, and on
+    the other lines of the script that join it to a text, or what is got by the same call."""
+    files = Files(folder=folder.resolve())
+    text = files.text(file) or ""
+    made = re.search(rf"^[ \t]*{re.escape(value)}\s*=\s*(\S+\(.*\))\s*$", text, re.MULTILINE)
+    alike = rf"^[ \t]*([\w.]+)\s*=\s*{re.escape(made[1])}\s*$" if made else r"(?!)"
+    for each in dict.fromkeys((value, *re.findall(alike, text, re.MULTILINE))):
+        name, right = rf"(?<![\w.]){re.escape(each)}(?![\w.(\[])", f"{function}({each})"
+        joined = re.compile(rf"[\"']\s*\+\s*{name}")
+        for number, code in enumerate(text.split("\n"), start=1):
+            is_other = function == "str" and joined.search(code)
+            is_it = number == line and each == value
+            if (is_it or is_other) and len(re.findall(name, code)) == 1:
+                lines = (files.text(file) or "").split("\n")
+                lines[number - 1] = re.sub(name, right.replace("\\", r"\\"), lines[number - 1])
+                message = f"line {number} of {file}: `{each}` is of another type than is needed here"
+                files.change("missing-call", file, "\n".join(lines), message, convert(function, each))
+    return list(files.repairs)
+
+
+NUMBER_PLACE = re.compile(r"%[-+ #0-9.]*[dif](?!\w)")
+
+
+def text_place(folder: Path, file: str, line: int) -> list[Repair]:
+    """Return the repair that makes `%s` of the only `%d` or `%f` of a line at which a run ended, as a text came."""
+    files = Files(folder=folder.resolve())
+    lines = (files.text(file) or "").split("\n")
+    found = NUMBER_PLACE.findall(lines[line - 1]) if line <= len(lines) else []
+    if len(found) == 1:
+        lines[line - 1] = lines[line - 1].replace(found[0], "%s")
+        message = f"line {line} of {file}: `{found[0]}` takes a number, and gets a text"
+        files.change("missing-call", file, "\n".join(lines), message, f"write `%s` instead of `{found[0]}`")
+    return list(files.repairs)
+
+
+def loop_rate(folder: Path, file: str, line: int, right: str) -> list[Repair]:
+    """Return the repair that writes `right`, such as `rospy.Rate(10)`, in place of the line's only call of that name:
+    the rate's own criteria keep their loss, and others show what the loop does."""
+    files = Files(folder=folder.resolve())
+    lines = (files.text(file) or "").split("\n")
+    name = re.escape(right.partition("(")[0].rpartition(".")[2])
+    call = re.compile(rf"((?:\w+\.)*{name})\([^()]*\)")
+    if line <= len(lines) and len(call.findall(lines[line - 1])) == 1:
+        given = right.partition("(")[2]
+        lines[line - 1] = call.sub(lambda found: f"{found[1]}({given}", lines[line - 1])
+        files.change("loop-rate", file, "\n".join(lines), f"line {line} of {file}: the loop has another rate")
+    return list(files.repairs)
+
+
+def message_type(folder: Path, file: str, line: int, package: str, name: str) -> list[Repair]:
+    """Return the repair that subscribes with another type on a line of a script, and imports it."""
+    files = Files(folder=folder.resolve())
+    lines = (files.text(file) or "").split("\n") if file.endswith(".py") else []
+    code = lines[line - 1] if line <= len(lines) else ""
+    given = re.search(r"Subscriber\(\s*[^,()]+,\s*(?:data_class\s*=\s*)?([\w.]+)", code)
+    module = f"{package}.msg"
+    imported = next((i for i, one in enumerate(lines) if one.startswith(f"from {module} import ")), None)
+    whole = f"import {module}" in lines
+    if given is None or not (whole or imported is not None):
+        return []
+    lines[line - 1] = code[: given.start(1)] + (f"{module}.{name}" if whole else name) + code[given.end(1) :]
+    if imported is not None and not whole:
+        names = re.findall(r"[\w*]+", lines[imported].partition(" import ")[2])
+        rest = "\n".join(lines[imported + 1 :])
+        used = [one for one in names if one != given[1] or re.search(rf"\b{one}\b", rest)]
+        new = [] if {"*", name} & {*names} else [name]
+        lines[imported] = f"from {module} import {', '.join([*used, *new])}" if new else lines[imported]
+    message = f"line {line} of {file}: the topic has the type {package}/{name}"
+    fix = f"write `{lines[line - 1].strip()}`"
+    files.change("message-type", file, "\n".join(lines), message, fix)
+    return list(files.repairs)

@@ -1,0 +1,64 @@
+"""What only a run shows, and the hint of the lost criterion says how to write: a loop's rate, and a topic's type."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from grader.package.repairs.of_runs import conversions, repairs_by_hint
+from grader.wording import ask_rate, ask_type
+
+
+@pytest.mark.parametrize(
+    ("code", "right", "after"),
+    [
+        ("rate = rospy.Rate(1)", "rospy.Rate(10)", "rate = rospy.Rate(10)"),
+        ("rate = Rate(hz)", "rospy.Rate(10)", "rate = Rate(10)"),
+        (
+            "rospy.Timer(rospy.Duration(10), tick)",
+            "rospy.Duration(0.1)",
+            "rospy.Timer(rospy.Duration(0.1), tick)",
+        ),
+        ("time.sleep(100)", "time.sleep(0.1)", "time.sleep(0.1)"),
+        ("rospy.Rate(rospy.get_param('rate'))", "rospy.Rate(10)", None),
+        ("sleep(1); sleep(1)", "sleep(0.1)", None),
+    ],
+)
+def test_a_rate(code: str, right: str, after: str | None, tmp_path: Path) -> None:
+    (tmp_path / "a.py").write_text(f"import rospy\n{code}\n")
+    hint = ask_rate("10", "a.py, line 2", right)
+    found = repairs_by_hint(tmp_path, hint, "b.py", 1)
+    assert [(one.kind, one.line, one.after) for one in found] == ([("loop-rate", 2, after)] if after else [])
+
+
+@pytest.mark.parametrize(
+    ("imports", "given", "imports_after", "after"),
+    [
+        ("from std_msgs.msg import Int8", "Int8", "from std_msgs.msg import String", "String"),
+        ("from std_msgs.msg import Int8, String", "Int8", "from std_msgs.msg import Int8, String", "String"),
+        ("from std_msgs.msg import *", "Int8", "from std_msgs.msg import *", "String"),
+        ("import std_msgs.msg", "std_msgs.msg.Int8", "import std_msgs.msg", "std_msgs.msg.String"),
+        ("from lab.msg import Num", "Num", "from lab.msg import Num", "Num"),
+    ],
+)
+def test_a_type(imports: str, given: str, imports_after: str, after: str, tmp_path: Path) -> None:
+    text = "{}\nrospy.Subscriber('a', {}, f)\n"
+    (tmp_path / "a.py").write_text(text.format(imports, given))
+    found = repairs_by_hint(tmp_path, ask_type("std_msgs/String"), "a.py", 2)
+    changed = text.format(imports_after, after).strip("\n").split("\n")
+    assert [one.after.split("\n")[-1] for one in found] == ([changed[1]] if given != after else [])
+    assert all(one.after in "\n".join(changed) for one in found)
+
+
+def test_no_type_is_known_where_the_hint_has_none(tmp_path: Path) -> None:
+    (tmp_path / "a.py").write_text("rospy.Subscriber('a', Int8, f)\n")
+    assert repairs_by_hint(tmp_path, ask_type(None), "a.py", 1) == []
+    assert repairs_by_hint(tmp_path, ask_type("std_msgs/String"), "a.py", 9) == []
+
+
+def test_what_the_same_call_gives_is_converted_too(tmp_path: Path) -> None:
+    code = "n = get('x')\nlog('a: ' + n)\nm = get('x')\nlog('b: ' + m)\nk = get('y')\nlog('c: ' + k)\n"
+    (tmp_path / "a.py").write_text(code)
+    found = [one.after for one in conversions(tmp_path, "a.py", 2, "str", "n")]
+    assert found == ["log('a: ' + str(n))", "log('b: ' + str(m))"]
