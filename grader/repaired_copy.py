@@ -13,6 +13,7 @@ import shutil
 from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
+from itertools import chain
 from pathlib import Path
 
 from grader.files import temporary_folder
@@ -35,9 +36,10 @@ from grader.model.verdict import FileCitation
 from grader.package.manifest import parse_manifest
 from grader.package.repairs import NotRepairable, apply_repair, find_repairs, wanted_of
 from grader.package.repairs.editing import read_data
-from grader.package.repairs.of_runs import repairs_by_hint
+from grader.package.repairs.of_runs import other_field, repairs_by_hint
 from grader.package.repairs.python import ros_clock, turn_sign
 from grader.rubric.model import Rubric
+from grader.wording import fields_told
 
 STEERS_WRONG, WARPED = "steers-wrong", "warped"
 REPAIRS_MAX = 4
@@ -115,20 +117,24 @@ def _choose_logic(
     submission: Submission, rubric: Rubric, criteria: Sequence[CriterionResult], lost: Collection[str]
 ) -> tuple[list[Repair], list[str]]:
     """Return the only repair of logic that could be the reason for a lost mark, and all scenarios that run its script:
-    ROS's clock in place of the computer's, or the other sign for a turn to the wrong side."""
+    ROS's clock in place of the computer's, the other sign for a turn to the wrong side, or one field for another."""
     turning = {c.scenario: c.mistake.name for c in criteria if c.mistake and c.mistake.kind == STEERS_WRONG}
     led = {c.scenario for c in criteria if c.check in OF_WAYS and c.status.is_lost and not c.blocked_by}
+    fields = {c.scenario: told for c in criteria if c.status.is_lost and (told := fields_told(c.hint))}
+    folder, scripts = submission.package.folder, dict[str, str]()
     for name in sorted(lost) if not submission.also else ():
-        scripts = [start.script for start in rubric.scenarios[name].start if start.script]
-        found, folder = None, submission.package.folder
-        if len(scripts) == 1 and name in turning:
-            found = turn_sign(folder, scripts[0], turning[name])
-        if len(scripts) == 1 and found is None and rubric.scenarios[name].clock == WARPED:
-            found = ros_clock(folder, scripts[0])
-        if len(scripts) == 1 and found is None and name in led:
-            found = turn_sign(folder, scripts[0])
-        if found is not None and rubric.share_of(found.kind) > 0:
-            run = (i for i, one in rubric.scenarios.items() if scripts[0] in {s.script for s in one.start})
+        if len(own := [start.script for start in rubric.scenarios[name].start if start.script]) == 1:
+            scripts[name] = own[0]
+    warped = [name for name in scripts if rubric.scenarios[name].clock == WARPED]
+    possible = chain(
+        (turn_sign(folder, scripts[name], turning[name]) for name in scripts if name in turning),
+        (ros_clock(folder, scripts[name]) for name in warped),
+        (other_field(folder, scripts[name], *fields[name]) for name in scripts if name in fields),
+        (turn_sign(folder, scripts[name]) for name in scripts if name in led),
+    )
+    for found in filter(None, possible):
+        if rubric.share_of(found.kind) > 0:
+            run = (i for i, one in rubric.scenarios.items() if found.file in {s.script for s in one.start})
             return [found], sorted(run)
     return [], []
 

@@ -231,6 +231,24 @@ ASKED_TYPE = re.compile(r"use (\w+)/(\w+), the type that the handout asks for")
 """The package and the name in a hint of `ask_type`."""
 
 
+def ask_field(field: str, other: str, value: str = "") -> str:
+    """Return the hint on a field that another one has the values of: `set linear.x to 0.2, not linear.y`."""
+    return f"set {field} to {value}, not {other}" if value else f"set {field}, not {other}"
+
+
+def suspect_field(field: str, other: str) -> str:
+    """Return the same where it may be by chance: `is linear.y set in place of linear.x?`."""
+    return f"is {other} set in place of {field}?"
+
+
+def fields_told(hint: str) -> tuple[str, str] | None:
+    """Return the field and the other one of a hint of these two; None in any other."""
+    if (found := re.search(r"\bset ([\w.]+)(?: to [^\s,;]+)?, not ([\w.]*\w)", hint)) is not None:
+        return found[1], found[2]
+    found = re.search(r"\bis ([\w.]+) set in place of ([\w.]+)\?", hint)
+    return (found[2], found[1]) if found is not None else None
+
+
 def ask_rate(hz: str, where: str, right: str) -> str:
     """Return the hint on a line that asks for another rate: `make it 10 Hz in a.py, line 3: use rospy.Rate(10)`."""
     return f"make it {hz} Hz in {where}: use {right}"

@@ -52,7 +52,7 @@ from grader.model.verdict import (
     grade_again,
     passed,
 )
-from grader.wording import LISTED_MAX, join_words, plural, significant
+from grader.wording import LISTED_MAX, join_words, plural, significant, suspect_field
 
 VALUES_SHOWN = 4
 
@@ -384,7 +384,7 @@ def _other_value(
     beside = "" if other else set_beside(own, first.time_ns, params.field, params.value, params.tolerance)
     if beside:
         seen += f"; {beside} is {value_text(params.value)}"
-        hint += f": is {beside} set in its place?"
+        hint += f": {suspect_field(params.field, beside)}"
     if params.when == "any":
         none = f"in none of {plural(len(found), 'message')}: at first {seen}"
         message = f"{params.field} of {params.topic} is {params.words} {none}"

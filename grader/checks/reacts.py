@@ -43,7 +43,7 @@ from grader.evidence.run import Channel, Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import Span, Status, Verdict, failed, failed_or_blocked, grade_again, passed
-from grader.wording import join_words, plural, significant
+from grader.wording import ask_field, join_words, plural, significant
 
 ORDER_S = 0.1
 """Two topics come over two connections: so much earlier a message may be recorded than what it answers."""
@@ -276,7 +276,7 @@ def _early(
         hint = f"give {params.effect.field} another value until the message comes that calls for this one"
         if beside := changing_beside(own, params.effect.field):
             message += f"; what changes is {beside}"
-            hint = f"set {params.effect.field}, not {beside}"
+            hint = ask_field(params.effect.field, beside)
     elif _is_turned_round(causes, effects, params):
         message, hint = _turned_words(params)
     verdict = failed(message, hint=hint, measured=f"{plural(len(too_early), 'message')} too early")
@@ -534,7 +534,7 @@ def _other_answer(
         fix += ", and it still has the value from before"
     beside = set_beside(own, came.time_ns, field or "", wanted, params.effect.tolerance)
     also = f", and {beside} is {value_text(wanted)}" if beside else ""
-    fix = f"set {field} to {value_text(wanted)}, not {beside}" if beside else fix
+    fix = ask_field(field or "", beside, value_text(wanted)) if beside else fix
     return f"{field} is {value_text(came.values[0])} then{also}", fix, field or ""
 
 

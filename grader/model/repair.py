@@ -17,14 +17,14 @@ RepairKind = Literal[
     "executable-bit", "encoding", "byte-order-mark", "line-ends", "shebang", "file-name", "python-syntax",
     "manifest-line", "build-line", "launch-syntax", "yaml-syntax", "package-name", "launch-type", "missing-import",
     "missing-call", "node-name", "topic-name", "service-name", "parameter-name", "ros-clock", "turn-sign",
-    "exchanged-files", "message-type", "loop-rate",
+    "exchanged-files", "message-type", "loop-rate", "other-field",
 ]  # fmt: skip
 """In the order in which a student would meet them."""
 
 KINDS: tuple[RepairKind, ...] = get_args(RepairKind)
 HALVING = frozenset({
     "python-syntax", "manifest-line", "build-line", "launch-syntax", "yaml-syntax", "missing-import", "missing-call",
-    "turn-sign",
+    "turn-sign", "other-field",
 })  # fmt: skip
 DEFAULT_SHARES: dict[RepairKind, float] = {kind: 0.5 if kind in HALVING else 1.0 for kind in KINDS}
 """Which share of its points a criterion keeps that passes on a copy with a repair of this kind. The criterion that asks
@@ -55,10 +55,11 @@ BY_HAND: dict[RepairKind, str] = {
     "exchanged-files": "two scripts that hold each other's code: exchange the two files",
     "message-type": "a subscriber with another type than its topic: rostopic info shows the type",
     "loop-rate": "a loop or a timer with another rate: rostopic hz shows it",
+    "other-field": "a value in another field of the message, linear.y for linear.x: rostopic echo shows the fields",
 }
 """How a mistake of this kind looks, and how it is repaired."""
 
-OF_LOGIC: frozenset[RepairKind] = frozenset({"ros-clock", "turn-sign"})
+OF_LOGIC: frozenset[RepairKind] = frozenset({"ros-clock", "turn-sign", "other-field"})
 """Kinds that no file shows to be mistakes: they count only where the copy passes, and nothing is made by itself."""
 
 

@@ -90,7 +90,9 @@ def beside_a_talker(
     for _ in range(TIMES_LATE):
         with make_place(files, limits=limits, sandbox=sandbox) as place:
             seen = run(place, scenario, tmp_path / "run.mcap")
-        if all(is_in_time(chatter) and chatter.data[:1] == (0,) for chatter in seen.student_channels("/chatter")):
+        if all(
+            is_in_time(chatter) and chatter.data[:1] == (0,) for chatter in seen.student_channels("/chatter")
+        ):
             break
     return seen
 

@@ -193,7 +193,10 @@ def assert_cases(report):
         ("while f():\n    if x:\n    rate.sleep()\n", "nothing in the block on line 2: below line 2, write"),
         ("if x:\nrospy.spin()\n", "nothing in the block on line 1: below line 1, write"),
         ("try:\n    main()\nexcept A:  \n", "nothing in the block on line 3: below line 3, write"),
-        ("def f():\n    try:\n        g()\n    except A:\npass\n", "after a `:` must be indented: start it four spaces further"),
+        (
+            "def f():\n    try:\n        g()\n    except A:\npass\n",
+            "after a `:` must be indented: start it four spaces further",
+        ),
         (
             "try:\n    main()\nexcept A:\n    # to do\n",
             "only comments in the block on line 3: below line 3, write",

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from grader.package.repairs.of_runs import conversions, repairs_by_hint
-from grader.wording import ask_rate, ask_type
+from grader.package.repairs.of_runs import conversions, other_field, repairs_by_hint
+from grader.wording import ask_field, ask_rate, ask_type, fields_told, suspect_field
 
 
 @pytest.mark.parametrize(
@@ -62,3 +62,21 @@ def test_what_the_same_call_gives_is_converted_too(tmp_path: Path) -> None:
     (tmp_path / "a.py").write_text(code)
     found = [one.after for one in conversions(tmp_path, "a.py", 2, "str", "n")]
     assert found == ["log('a: ' + str(n))", "log('b: ' + str(m))"]
+
+
+@pytest.mark.parametrize(
+    ("line", "right"),
+    [
+        ("    command.linear.y = 0.2\n", "    command.linear.x = 0.2\n"),
+        ("    command.linear.y += 0.1\n", "    command.linear.x += 0.1\n"),
+        ("    if command.linear.y == 0.2:\n        pass\n", ""),
+        ("    command.linear.x = 0\n    command.linear.y = 0.2\n", ""),
+        ("    nonlinear.y = 0.2\n", ""),
+    ],
+)
+def test_a_value_goes_into_the_other_field(line: str, right: str, tmp_path: Path) -> None:
+    (tmp_path / "drive.py").write_text(f"def drive():\n{line}")
+    found = other_field(tmp_path, "drive.py", *(fields_told(ask_field("linear.x", "linear.y", "0.2")) or ()))
+    assert [one.after for one in (found,) if one] == ([right.strip("\n")] if right else [])
+    assert fields_told(suspect_field("linear.x", "linear.y")) == ("linear.x", "linear.y")
+    assert fields_told("set linear.x to 0.2") is None

@@ -30,7 +30,7 @@ from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import Status, Verdict, failed, failed_or_blocked
-from grader.wording import join_words, significant
+from grader.wording import ask_field, join_words, significant
 
 STALLED_MS = 1000.0
 """In the time of the run, which may be faster than the wall's."""
@@ -97,7 +97,7 @@ def tell_end(verdict: Verdict, package: PackageFacts, run: Run) -> Verdict:
     for channel in run.student_channels() if verdict.status is Status.FAIL else ():
         if axis := other_axis(channel):
             why = f"velocities on {channel.topic} set {axis}, and their angular.z is always 0"
-            hint = f"set angular.z in place of {axis}: a robot on wheels turns by that alone"
+            hint = f"{ask_field('angular.z', axis)}: a robot on wheels turns by that alone"
             verdict = verdict.explained(why, hint)
     if end is None or end.by_itself or end.cause in verdict.message:
         return verdict
@@ -170,7 +170,7 @@ def why_still(verdict: Verdict, run: Run) -> Verdict:
             return verdict.explained(why, f"publish them on {join_words(hears, last='or')}")
         if any(one.left for one in commands) and not any(one.forward for one in commands):
             why = f"linear.x of {channel.topic} is always 0, and linear.y does not move a robot on wheels"
-            return verdict.explained(why, "set linear.x in place of linear.y")
+            return verdict.explained(why, ask_field("linear.x", "linear.y"))
     return verdict
 
 

@@ -1,4 +1,4 @@
-"""Repairs of what only a run shows: a value or a message of another type, or a loop's rate.
+"""Repairs of what only a run shows: a value or a message of another type, a loop's rate, or one field for another.
 
 The line is known by what a criterion cites or says, and what to write there by its hint (`grader/wording.py`).
 """
@@ -97,3 +97,20 @@ def message_type(folder: Path, file: str, line: int, package: str, name: str) ->
     fix = f"write `{lines[line - 1].strip()}`"
     files.change("message-type", file, "\n".join(lines), message, fix)
     return list(files.repairs)
+
+
+def other_field(folder: Path, file: str, field: str, other: str) -> Repair | None:
+    """Return the repair that sets `field` of a message wherever a script sets `other`; None where it sets both, or the
+    other one nowhere."""
+    files = Files(folder=folder.resolve())
+    text = files.text(file) or ""
+    end = r"(?=\s*[-+*/]?=(?!=))"
+    given = re.compile(rf"(?<=\.){re.escape(other)}{end}")
+    first = given.search(text)
+    if first is None or re.search(rf"\.{re.escape(field)}{end}", text):
+        return None
+    line = text.count("\n", 0, first.start()) + 1
+    message = f"line {line} of {file}: {other} is set where {field} is asked for"
+    fix = f"write `.{field} = …`, not `.{other} = …`"
+    files.change("other-field", file, given.sub(lambda _: field, text), message, fix)
+    return next(iter(files.repairs), None)

@@ -420,12 +420,10 @@ def _words(file: str, cause: Cause, steps: list[_Step], before: str) -> tuple[st
     if cause in {"unbound", "kept"}:
         return _shared_variables(place, cause, word.split(", "))
     if cause == "defined":
-        first_line, last_line, where, other, *names = word.split()
-        they = f"{join_words(f'`{name}`' for name in names)} {'is' if len(names) == 1 else 'are'} defined only below it"
-        return (
-            f"{place}: {they}",
-            f"move {lines_text(int(first_line) - 1, int(last_line) - 1)} {where} line {other}",
-        )
+        first_line, last_line, where, other, *below = word.split()
+        defined = f"{join_words(f'`{name}`' for name in below)} {'is' if len(below) == 1 else 'are'} defined"
+        moved = lines_text(int(first_line) - 1, int(last_line) - 1)
+        return f"{place}: {defined} only below it", f"move {moved} {where} line {other}"
     if cause not in WORDS:
         reason = reason_of(error.message, error.text, column=error.column) if error else Reason()
         fix = _rewritten(before, after) if cause == "python2" else ""
