@@ -249,6 +249,10 @@ def fields_told(hint: str) -> tuple[str, str] | None:
     return (found[2], found[1]) if found is not None else None
 
 
+SWAPPED = re.compile(r"on line (\d+), swap the two values in the brackets of `(\w+)`")
+"""The line and the function in the fix of arguments in the wrong order, which `package/lint` writes."""
+
+
 def ask_rate(hz: str, where: str, right: str) -> str:
     """Return the hint on a line that asks for another rate: `make it 10 Hz in a.py, line 3: use rospy.Rate(10)`."""
     return f"make it {hz} Hz in {where}: use {right}"

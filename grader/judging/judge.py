@@ -35,7 +35,11 @@ from grader.checks.support.topics import (
     SYSTEM_TOPICS,
     explain_by_unheard_topic,
 )
-from grader.checks.support.wrong_lines import explain_by_waiting_callback, explain_by_wrong_value
+from grader.checks.support.wrong_lines import (
+    explain_by_misplaced_value,
+    explain_by_waiting_callback,
+    explain_by_wrong_value,
+)
 from grader.errors import EvidenceError
 from grader.evidence.events import PACKAGE_RUN
 from grader.evidence.run import Run
@@ -320,6 +324,7 @@ EXPLANATIONS = (
     explain_by_refused_launch,
     explain_by_late_remap,
     explain_by_absent_parameter,
+    explain_by_misplaced_value,
     explain_by_exception,
     explain_by_unheard_topic,
     explain_by_overwritten_parameter,

@@ -80,3 +80,20 @@ def test_a_value_goes_into_the_other_field(line: str, right: str, tmp_path: Path
     assert [one.after for one in (found,) if one] == ([right.strip("\n")] if right else [])
     assert fields_told(suspect_field("linear.x", "linear.y")) == ("linear.x", "linear.y")
     assert fields_told("set linear.x to 0.2") is None
+
+
+@pytest.mark.parametrize(
+    ("line", "right"),
+    [
+        ("a = atan2(dx, dy)", "a = atan2(dy, dx)"),
+        ("a = math.atan2(g.x - p.x, g.y - p.y) - t", "a = math.atan2(g.y - p.y, g.x - p.x) - t"),
+        ("a = atan2(abs(dx), dy)", "a = atan2(dy, abs(dx))"),
+        ("a = atan2(f(g(dx)), dy)", ""),
+        ("a = atan2(dx, dy) + atan2(u, v)", ""),
+        ("a = atan2(dx)", ""),
+    ],
+)
+def test_two_values_are_swapped(line: str, right: str, tmp_path: Path) -> None:
+    (tmp_path / "a.py").write_text(f"{line}\n")
+    hint = "on line 1, swap the two values in the brackets of `atan2`"
+    assert [one.after for one in repairs_by_hint(tmp_path, hint, "a.py", 1)] == ([right] if right else [])

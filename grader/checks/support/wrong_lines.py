@@ -150,6 +150,14 @@ def explain_by_wrong_value(check: Check, package: PackageFacts, run: Run, verdic
     return verdict
 
 
+def explain_by_misplaced_value(check: Check, package: PackageFacts, run: Run, verdict: Verdict) -> Verdict:
+    """Return the same of values in a wrong place or order, which no exception puts there."""
+    if verdict.basis.wrong not in {"place", "order"}:
+        return verdict
+    explained = explain_by_wrong_value(check, package, run, verdict)
+    return explained if explained.basis.cause else verdict
+
+
 OF_VALUES = ("action-result", "rostest", "stamps")
 """Checks of what a node sends, besides those of what it does upon what it hears."""
 OF_RESULTS = ("prints", "rostest")

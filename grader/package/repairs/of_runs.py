@@ -10,7 +10,7 @@ from pathlib import Path
 
 from grader.model.repair import Repair
 from grader.package.repairs.editing import Files
-from grader.wording import ASKED_RATE, ASKED_TYPE, CONVERTED, TEXT_PLACE, convert
+from grader.wording import ASKED_RATE, ASKED_TYPE, CONVERTED, SWAPPED, TEXT_PLACE, convert
 
 
 def repairs_by_hint(folder: Path, hint: str, file: str, line: int) -> list[Repair]:
@@ -19,6 +19,8 @@ def repairs_by_hint(folder: Path, hint: str, file: str, line: int) -> list[Repai
         return loop_rate(folder, rate[1], int(rate[2]), rate[3])
     if (asked := ASKED_TYPE.search(hint)) is not None:
         return message_type(folder, file, line, asked[1], asked[2])
+    if (turned := SWAPPED.search(hint)) is not None:
+        return swapped_arguments(folder, file, int(turned[1]), turned[2])
     if TEXT_PLACE in hint:
         return text_place(folder, file, line)
     told = CONVERTED.search(hint)
@@ -97,6 +99,22 @@ def message_type(folder: Path, file: str, line: int, package: str, name: str) ->
     fix = f"write `{lines[line - 1].strip()}`"
     files.change("message-type", file, "\n".join(lines), message, fix)
     return list(files.repairs)
+
+
+def swapped_arguments(folder: Path, file: str, line: int, function: str) -> list[Repair]:
+    """Return the repair that swaps the two arguments of the line's only call of a function: `atan2(dx, dy)`."""
+    files = Files(folder=folder.resolve())
+    lines = (files.text(file) or "").split("\n")
+    call = re.compile(rf"\b{function}\(({ARGUMENT})(,\s*)({ARGUMENT})\)")
+    if line <= len(lines) and len(call.findall(lines[line - 1])) == 1:
+        lines[line - 1] = call.sub(rf"{function}(\3\2\1)", lines[line - 1])
+        message = f"line {line} of {file}: the two values of `{function}` are the wrong way round"
+        files.change("missing-call", file, "\n".join(lines), message)
+    return list(files.repairs)
+
+
+ARGUMENT = r"(?:[^(),]|\([^()]*\))+"
+"""With brackets in it that have none themselves."""
 
 
 def other_field(folder: Path, file: str, field: str, other: str) -> Repair | None:
