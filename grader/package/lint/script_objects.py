@@ -426,23 +426,25 @@ def hidden_names(tree):
 
 
 def hidden_classes(tree, imported):
-    """Yield the first message that takes the name of its class, which an import gives: `String = String()`."""
-    made = [(n, dotted(getattr(n.value, "func", None))) for n in all_of(tree, ast.Assign)]
+    """Yield the first message or value that takes the name of a class, which an import gives: `String = String()`."""
+    made = [(n, name) for n in all_of(tree, ast.Assign) for name in map(dotted, n.targets)]
     made = [(n, name) for n, name in made if name in imported and name[:1].isupper()]
-    for node, name in [(n, name) for n, name in made if name in map(dotted, n.targets)][:1]:
+    made = [(n, name, dotted(getattr(n.value, "func", None)) == name) for n, name in made]
+    for node, name, is_made in [one for one in made if one[2] or ".msg." in imported[one[1]]][:1]:
         is_message = ".msg." in imported[name]
         classes = {id(n.func) for n in all_of(tree, ast.Call)}
         given = (argument(n, 1, "data_class") for n in walk(tree) if called_name(n) in NAMED)
         classes |= {id(one) for types in given for one in types}
         names = {n.id for n in all_of(tree, ast.Name)}
         free = [one for one in ("msg", "message") if one not in names and is_message]
-        other, what = (free or ["own_" + name.lower()])[0], "message" if is_message else "object"
+        other = (free or ["own_" + name.lower()])[0]
+        what = ("message" if is_message else "object") if is_made else "value"
         meant = [n for n in walk(tree) if getattr(n, "id", "") == name and id(n) not in classes]
         where = listed(sorted({n.lineno for n in meant}))
         message = "line %d calls a%s `%s`, and hides the class of that name"
         message %= (node.lineno, (" " if is_message else "n ") + what, name)
-        given = "…" if node.value.args or node.value.keywords else ""
-        fix = "on %s, call the %s `%s`, as in `%s = %s(%s)`" % (where, what, other, other, name, given)
+        given = "%s(%s)" % (name, "…" * bool(node.value.args or node.value.keywords)) if is_made else "…"
+        fix = "on %s, call the %s `%s`, as in `%s = %s`" % (where, what, other, other, given)
         yield slip(node.lineno, "hides-class", message, fix, name)
 
 

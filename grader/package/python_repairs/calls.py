@@ -22,7 +22,10 @@ from grader.package.python_repairs.published import (
     Argument,
     behind_commas,
     called,
+    data_of_data,
+    hidden_types,
     is_text,
+    name_of_a_text,
     names_in,
     published_nothing,
     published_together,
@@ -260,6 +263,8 @@ def _wrong_arguments(tree: ast.Module, kinds: list[str]) -> Iterator[Argument]:
     published = {ast.unparse(target): kind for target, value in values if (kind := published_type(value))}
     yield from published_nothing(tree)
     yield from behind_commas(tree)
+    yield from hidden_types(tree, types)
+    yield from data_of_data(tree)
     for call in (n for n in nodes_in(tree) if isinstance(n, ast.Call)):
         name = called(call)
         owner = ast.unparse(call.func.value) if isinstance(call.func, ast.Attribute) else ""
@@ -272,6 +277,7 @@ def _wrong_arguments(tree: ast.Module, kinds: list[str]) -> Iterator[Argument]:
         elif name == "publish" and owner:
             kind = published.get(owner, "")
             yield from text_of_a_number(call, variables_of(tree)) if NUMBERS.fullmatch(kind) else ()
+            yield from name_of_a_text(call, tree) if kind == "String" else ()
             yield from published_together(call, kind)
         elif _is_rospys(call.func, of_rospy, rospy):
             yield from _logged(call) if LOGS.fullmatch(name) else ()

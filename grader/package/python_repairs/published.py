@@ -66,6 +66,61 @@ def _alone_in_text(node: ast.expr) -> ast.expr | None:
     return first.value if isinstance(first, ast.FormattedValue) else None
 
 
+def name_of_a_text(call: ast.Call, tree: ast.Module) -> Iterator[Argument]:
+    """Of `publish('text')` on a topic of texts, where a variable of that name gets a text."""
+    given = call.args[0] if len(call.args) == 1 else None
+    values = [
+        n.value for n in nodes_in(tree) if isinstance(n, ast.Assign) for t in n.targets if _is_named(t, given)
+    ]
+    if is_text(given) and values and all(map(_makes_text, values)):
+        why = f"with quotes, {given.value!r} is these letters, and not the variable"
+        yield Argument([(given, given.value)], why)
+
+
+def _is_named(target: ast.expr, given: ast.expr | None) -> bool:
+    return is_text(given) and ast.unparse(target) == given.value
+
+
+def _makes_text(value: ast.expr) -> bool:
+    """Return whether it is a text, or made of one."""
+    if isinstance(value, ast.BinOp):
+        return _makes_text(value.left)
+    if isinstance(value, ast.Call) and isinstance(value.func, ast.Attribute):
+        return value.func.attr in {"format", "join"} and is_text(value.func.value)
+    return is_text(value) or isinstance(value, ast.JoinedStr) or called(value) == "str"
+
+
+def hidden_types(tree: ast.Module, types: AbstractSet[str]) -> Iterator[Argument]:
+    """Of `String = 'a'`, after which `String` is no type of messages any more."""
+    targets = [t for n in nodes_in(tree) if isinstance(n, ast.Assign) for t in n.targets]
+    hidden = [t.id for t in targets if isinstance(t, ast.Name) and t.id in types]
+    calls = [n for n in nodes_in(tree) if isinstance(n, ast.Call)]
+    classes: set[ast.expr] = {one.func for one in calls}
+    for one in (one for one in calls if called(one) in {"Publisher", "Subscriber", "isinstance"}):
+        classes |= {*one.args[1:2], *(k.value for k in one.keywords if k.arg == "data_class")}
+    names = {n.id for n in nodes_in(tree) if isinstance(n, ast.Name)}
+    names |= {n.arg for n in nodes_in(tree) if isinstance(n, ast.arg)}
+    other = next((one for one in ("msg", "message", "own_message") if one not in names), "")
+    for name in hidden[:1] if other else ():
+        meant = [n for n in nodes_in(tree) if isinstance(n, ast.Name) and n.id == name and n not in classes]
+        why = f"from here on, `{name}` is a value and no longer the class of the messages"
+        yield Argument([(one, other) for one in sorted(meant, key=lambda n: n.lineno)], why)
+
+
+def data_of_data(tree: ast.Module) -> Iterator[Argument]:
+    """Of `msg.data` below `msg = msg.data`, which is the value itself."""
+    for function in (n for n in nodes_in(tree) if isinstance(n, ast.FunctionDef)):
+        for taken in (n for n in function.body if isinstance(n, ast.Assign) and len(n.targets) == 1):
+            name, value = taken.targets[0], taken.value
+            if isinstance(name, ast.Name) and ast.unparse(value) == f"{name.id}.data":
+                later = [
+                    n for n in nodes_in(function) if isinstance(n, ast.Attribute) and n.lineno > taken.lineno
+                ]
+                why = f"line {taken.lineno} makes the value itself of `{name.id}`, so it has no `.data`"
+                for node in (n for n in later if ast.unparse(n) == f"{name.id}.data"):
+                    yield Argument([(node, name.id)], why)
+
+
 def variables_of(tree: ast.Module) -> set[str]:
     """Return the names that are given a value, and those of objects (`self.n`)."""
     stored = [n for n in nodes_in(tree) if isinstance(n, ast.Name | ast.Attribute)]
