@@ -73,7 +73,7 @@ TYPED = "write `input` in place of `raw_input`"
 
 
 class Repair(Record):
-    """One mistake, and how it is repaired. Logic is never repaired, but for one clock and the sign of one turn."""
+    """One mistake, and how it is repaired. Logic is never repaired, but for a clock, a rate and the sign of one turn."""
 
     kind: RepairKind
     """What kind of repair it is, as in the rubric's `repairs`."""
@@ -163,7 +163,7 @@ def _where_and_how(repair: Repair) -> tuple[str, str]:
         # A fix that is a sentence: it mostly names the line itself.
         below = len(new) > 1 and new[0] == repair.before and repair.line is not None
         named = re.match(
-            r"(delete|replace the tabs: start|start|indent|write|make|remove the `#` of|in place of|"
+            r"(delete|move|replace the tabs: start|start|indent|write|make|remove the `#` (?:of|from)|in place of|"
             r"below(?: the \S+ on)?) lines? \d|write the keys in levels|write into it|at the end of",
             repair.fix,
         )

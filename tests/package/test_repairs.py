@@ -254,6 +254,12 @@ def test_a_repair_whose_lines_are_gone_is_refused(tmp_path: Path) -> None:
     assert (folder / TALKER).read_text() == "import rospy\n"
 
 
+@pytest.mark.parametrize("fix", ["remove the `#` from line 3", "move lines 8 to 9 above line 3"])
+def test_a_line_is_told_once(fix: str) -> None:
+    one = Repair(kind="missing-call", file="a.py", line=3, before="x", after="y", message="", fix=fix)
+    assert advice_on([one]) == [f"a.py: {fix}"]
+
+
 def test_a_line_that_is_repaired_twice_is_told_once() -> None:
     lines = [(2, "a", "b"), (3, "x", "y"), (2, "b", "c")]
     known = {"kind": "missing-call", "file": "a.py", "message": "wrong"}
