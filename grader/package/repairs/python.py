@@ -420,10 +420,7 @@ def _words(file: str, cause: Cause, steps: list[_Step], before: str) -> tuple[st
     if cause in {"unbound", "kept"}:
         return _shared_variables(place, cause, word.split(", "))
     if cause == "defined":
-        first_line, last_line, where, other, *below = word.split()
-        defined = f"{join_words(f'`{name}`' for name in below)} {'is' if len(below) == 1 else 'are'} defined"
-        moved = lines_text(int(first_line) - 1, int(last_line) - 1)
-        return f"{place}: {defined} only below it", f"move {moved} {where} line {other}"
+        return _defined_below(place, word)
     if cause not in WORDS:
         reason = reason_of(error.message, error.text, column=error.column) if error else Reason()
         fix = _rewritten(before, after) if cause == "python2" else ""
@@ -449,6 +446,13 @@ def _words(file: str, cause: Cause, steps: list[_Step], before: str) -> tuple[st
     if cause == "level" and further in DEEPER:
         fix += f" (or, if the line that begins its block, `if …:`, is missing: write that above line {first.line})"
     return said, fix if cause != "old-name" or word == "raw_input" else ""
+
+
+def _defined_below(place: str, word: str) -> tuple[str, str]:
+    """Return the same of what a line needs above it; `word` says which lines to move where, and names the functions."""
+    first, last, where, other, *names = word.split()
+    they = f"{join_words(f'`{name}`' for name in names)} {'are' if names[1:] else 'is'} defined only below it"
+    return f"{place}: {they}", f"move {lines_text(int(first) - 1, int(last) - 1)} {where} line {other}"
 
 
 def _shared_variables(place: str, cause: Cause, words: list[str]) -> tuple[str, str]:
