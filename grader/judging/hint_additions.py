@@ -29,8 +29,10 @@ from grader.checks.support.scripts import (
     programs,
 )
 from grader.checks.support.text import (
+    PAUSE,
     RATE_SLOT,
     RENAME_IF_MEANT,
+    STAY_ALIVE,
     TYPE_SLOT,
     VALUE_SLOT,
     code_of,
@@ -341,7 +343,9 @@ def fill_slots(verdict: Verdict, criterion: Criterion, rubric: Rubric) -> Verdic
         sent = {str(probe.topic): probe.type for probe in scenario.probes} if scenario is not None else {}
         name = str(sent.get(str(criterion.parameters.get("topic", "")), "…")).rpartition("/")[2]
         verdict = verdict.model_copy(update={"hint": verdict.hint.replace(TYPE_SLOT, name)})
-    if VALUE_SLOT not in verdict.hint:
+    loop = f"publish in a loop `while not rospy.is_shutdown():`: {PAUSE}"
+    hint = verdict.hint.replace(_STAY_ALIVE, loop) if _is_publisher(criterion, rubric) else verdict.hint
+    if VALUE_SLOT not in hint and RATE_SLOT not in hint:
         return verdict
     asked = {
         one.check: one.parameters
@@ -351,8 +355,18 @@ def fill_slots(verdict: Verdict, criterion: Criterion, rubric: Rubric) -> Verdic
     template = str(asked.get("message", {}).get("template", ""))
     value = f"`{in_language(code_of(template), 'python')}`" if template else "a value in the code"
     hz = float(str(asked.get("rate", {}).get("rate_hz", USUAL_RATE_HZ)))
-    hint = verdict.hint.replace(VALUE_SLOT, value).replace(RATE_SLOT, f"rospy.Rate({significant(hz)})")
+    hint = hint.replace(VALUE_SLOT, value).replace(RATE_SLOT, f"rospy.Rate({significant(hz)})")
     return verdict.model_copy(update={"hint": hint})
+
+
+_STAY_ALIVE = in_language(STAY_ALIVE, "python")
+
+
+def _is_publisher(criterion: Criterion, rubric: Rubric) -> bool:
+    """Return whether a criterion is about a program that alone is started, and publishes at a rate that is asked."""
+    scenario = rubric.scenarios.get(criterion.scenario or "")
+    asked = {one.check for one in rubric.criteria if one.scenario == criterion.scenario}
+    return scenario is not None and len(scenario.start) == 1 and "rate" in asked and not scenario.probes
 
 
 def name_same_file(verdict: Verdict, criterion: Criterion, facts: Facts) -> Verdict:

@@ -57,12 +57,11 @@ from grader.checks.support.scripts import (
 from grader.checks.support.text import (
     ARGUMENT_HINT,
     CAUSES,
-    LOOP,
     NEEDS_NETWORK,
     NO_INPUT,
     OFFLINE,
     PAUSE,
-    SPIN,
+    STAY_ALIVE,
     VALUE_SLOT,
     explain_arguments,
     refused_options,
@@ -224,9 +223,8 @@ def _ran_to_the_end(printed: Sequence[str], package: PackageFacts) -> Ending:
     last = printed[-1] if printed else ""
     if found := unfound_program(printed, package):
         return Ending(*found, unbuilt=found[1] == BUILD_FIRST_HINT)
-    hint = f"a node has to stay alive: `{SPIN}`, or a loop `{LOOP}`"
     if not PRINTED_ERROR.search(last):
-        return Ending("its script ran to the end", hint, by_itself=True)
+        return Ending("its script ran to the end", STAY_ALIVE, by_itself=True)
     hint = "fix that error; without the `except` that prints it, Python says on which line it is"
     return Ending(f"its script ran to the end, and printed last: {shown(last)}", hint, by_itself=True)
 

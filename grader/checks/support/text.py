@@ -210,6 +210,7 @@ def in_language(hint: str, language: Language | None) -> str:
 
 LOOP = python_or_cpp("while not rospy.is_shutdown():", "while (ros::ok())")
 SPIN = python_or_cpp("rospy.spin()", "ros::spin()")
+STAY_ALIVE = f"a node has to stay alive: `{SPIN}`, or a loop `{LOOP}`"
 INIT = python_or_cpp("rospy.init_node(…)", "ros::init(argc, argv, …) and ros::NodeHandle")
 RATE = python_or_cpp("rospy.Rate", "ros::Rate")
 GET_TIME = python_or_cpp("rospy.get_time()", "ros::Time::now().toSec()")
