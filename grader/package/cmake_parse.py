@@ -31,7 +31,7 @@ _CHARS_MAX = 2_000_000
 _VALUE_CHARS_MAX = 20_000
 FILE_BYTES_MAX = 200_000
 _FALSE = frozenset({"0", "OFF", "NO", "FALSE", "N", "IGNORE", "NOTFOUND"})
-_LONE_DOLLAR = re.compile(r"(\\.)|\$(?![A-Za-z]*\{)", re.DOTALL)
+_LONE_SIGN = re.compile(r"(\\.|\$[A-Za-z]*\{)|[${]", re.DOTALL)
 
 # What find_package(catkin) sets (catkin's catkin_destinations.cmake), `{0}` the project's name
 _CATKIN = {
@@ -268,8 +268,8 @@ class _Reader:
 
 
 def _escape(token: Token) -> Token:
-    """With each `$` escaped that begins no variable (`$<TARGET_FILE:x>`): the library stops there."""
-    value = _LONE_DOLLAR.sub(lambda found: found[1] or r"\$", token.value)
+    """With each `$` and `{` escaped that begins no variable (`$<TARGET_FILE:x>`, `{NAME}`): the library stops there."""
+    value = _LONE_SIGN.sub(lambda found: found[1] or f"\\{found[0]}", token.value)
     if token.kind == "BRACKETED" or value == token.value:
         return token
     return Token(kind=token.kind, value=value, span=token.span, line=token.line, column=token.column)

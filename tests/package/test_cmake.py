@@ -88,6 +88,14 @@ def test_loops_unknown_variables_and_lone_dollars(tmp_path):
     assert not calls_of(facts, "message")
 
 
+def test_a_brace_without_its_dollar_stays_in_its_word(tmp_path):
+    facts = facts_of(tmp_path, "install(PROGRAMS a.py DESTINATION {WHERE})\ninstall(FILES {B} ${C}{D}/e)\n")
+    assert calls_of(facts, "install") == [
+        ("PROGRAMS", "a.py", "DESTINATION", "{WHERE}"),
+        ("FILES", "{B}", "${C}{D}/e"),
+    ]
+
+
 def test_included_files_of_the_package_count_and_no_others(tmp_path):
     (tmp_path / "cmake").mkdir()
     (tmp_path / "cmake" / "more.cmake").write_text("install(FILES x)\ninclude(cmake/more.cmake)\n")
