@@ -25,7 +25,16 @@ from typing import Any, TypeAlias
 
 from grader.arena.control_groups import Cgroups, find_cgroups
 from grader.arena.limits import RunLimits
-from grader.arena.sandbox_files import HOME, RECORD, RECORD_INSIDE, RECORD_SHIM, SHIMS, STANDINS
+from grader.arena.sandbox_files import (
+    COMPLETED,
+    HOME,
+    RECORD,
+    RECORD_INSIDE,
+    RECORD_SHIM,
+    SHIMS,
+    STANDINS,
+    packages_without_program,
+)
 from grader.errors import HostError, SandboxMissing
 from grader.host_programs import LOCALHOST, LOCALHOST_HINT, find_host_program, resolves, run_host_program
 from grader.model import SandboxMode
@@ -107,7 +116,7 @@ class Sandbox(Record):
             word for name in OWN_ETC for word in ("--ro-bind", copy_of(place / "etc" / name), f"/etc/{name}")
         ]
         return [
-            *_system(ros), *_rosbag_record(ros, place), "--proc", "/proc", "--dev", "/dev",
+            *_system(ros), *_rosbag_record(ros, place), *_completed(ros, place), "--proc", "/proc", "--dev", "/dev",
             "--bind", scratch(limits.shared_bytes, limits.shared_files), "/dev/shm", "--remount-ro", "/dev",  # noqa: S108 - its own
             "--bind", scratch(limits.tmp_bytes, limits.tmp_files), "/tmp",  # noqa: S108 - its own
             "--bind", scratch(limits.home_bytes, limits.home_files), HOME, *etc,
@@ -181,6 +190,12 @@ def _rosbag_record(ros: RosInstallation, place: Path) -> Iterator[Word]:
     if real is not None:
         yield from ("--ro-bind", str(real), RECORD_INSIDE)
         yield from ("--ro-bind", copy_of(place / "bin" / RECORD_SHIM), str(real))
+
+
+def _completed(ros: RosInstallation, place: Path) -> Iterator[Word]:
+    """Put the packages that this ROS has without a program, with the grader's, over the installed ones."""
+    for installed, _ in packages_without_program(ros):
+        yield from ("--ro-bind", copy_of(place / COMPLETED / installed.name), str(installed))
 
 
 def is_shown(path: Path, ros: RosInstallation) -> bool:

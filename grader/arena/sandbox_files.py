@@ -50,6 +50,8 @@ SHARE = "share"
 TWO_NAMES = {"rospy_tutorials": ("talker", "listener")}
 """Programs that the real package has with an ending, too."""
 LIBRARY = "python"
+COMPLETED = "completed"
+"""Packages that this ROS has without a program, each with the grader's program beside its files."""
 MESSAGES = "from standin_messages import define\n\ndefine(globals())\n"
 CMAKE = "cmake"
 
@@ -81,6 +83,10 @@ def prepare(place: Path, ros: RosInstallation) -> None:
     shutil.copyfile(ROS_SIDE / "opener.py", shims / "grader-open.py")
     _write_quick_programs(shims, ros)
     copy_standins(place / "standins", ros)
+    for installed, programs in packages_without_program(ros):
+        _copy(installed, _made(place / COMPLETED) / installed.name)
+        for program in programs:
+            _copy(program, place / COMPLETED / installed.name / program.name)
 
 
 def _write_quick_programs(shims: Path, ros: RosInstallation) -> None:
@@ -121,6 +127,19 @@ def _program(shims: Path, source: str, name: str, called: Sequence[str]) -> None
 def standin_packages() -> tuple[str, ...]:
     """Return every package that the grader has a stand-in for."""
     return tuple(sorted(p.parent.name for p in STANDIN_SOURCES.glob(f"*/{MANIFEST}")))
+
+
+def packages_without_program(ros: RosInstallation) -> Iterator[tuple[Path, list[Path]]]:
+    """Yield the folder of each package that this ROS has, and the grader's programs that it lacks."""
+    for source in sorted(path for path in STANDIN_SOURCES.iterdir() if path.name not in {LIBRARY, CMAKE}):
+        prefixes = [] if (source / MANIFEST).is_file() else list(map(Path, (*ros.prefixes, "/usr")))
+        found = next((p for p in prefixes if (p / SHARE / source.name / MANIFEST).is_file()), None)
+        if found is None:
+            continue
+        places = [found / "lib" / source.name, found / SHARE / source.name]
+        lacking = [p for p in sorted(source.iterdir()) if not any((q / p.name).exists() for q in places)]
+        if lacking := [path for path in lacking if path.is_file()]:
+            yield places[1], lacking
 
 
 def missing_packages(ros: RosInstallation) -> tuple[str, ...]:
@@ -171,6 +190,11 @@ def _prepend(path: str, entries: list[str]) -> str:
     workspace goes before the course's."""
     before = [entry for entry in path.split(os.pathsep) if entry]
     return os.pathsep.join([*(entry for entry in entries if entry not in before), *before])
+
+
+def _made(folder: Path) -> Path:
+    folder.mkdir(exist_ok=True)
+    return folder
 
 
 def _copy(source: Path, target: Path) -> None:

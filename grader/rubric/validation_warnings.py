@@ -237,7 +237,7 @@ def _same_criteria(rubric: WrittenRubric) -> Iterator[Fault]:
 
 def _other_rates(rubric: WrittenRubric) -> Iterator[Fault]:
     """Yield rates of a topic for which an earlier criterion wants another one, in a run of the same processes."""
-    before: dict[tuple[str, ...], tuple[str, float, dict[str, Any]]] = {}
+    before: dict[tuple[str, ...], tuple[str, float, dict[str, Any], dict[str, Any]]] = {}
     for criterion in rubric.criteria:
         given, scenario = criterion.given, criterion.scenario
         rate_hz, cause = given.get("rate_hz"), as_map(given.get("cause"))
@@ -245,9 +245,9 @@ def _other_rates(rubric: WrittenRubric) -> Iterator[Fault]:
             continue
         started = json.dumps([scenario.get("start"), scenario.get("params")], sort_keys=True)
         key = (str(given.get("topic")), str(given.get("of")), started)
-        earlier, other_hz, other = before.setdefault(key, (criterion.id, rate_hz, cause))
-        # Different causes may have different rates.
-        if rate_hz != other_hz and (cause == other or not (cause and other)):
+        earlier, other_hz, other, run = before.setdefault(key, (criterion.id, rate_hz, cause, scenario))
+        # Different causes may have different rates, and a run without the cause has the rate before it.
+        if rate_hz != other_hz and (cause == other or (not (cause and other) and scenario == run)):
             fault = f"{earlier} wants {other_hz:g} Hz on {key[0]}, not {rate_hz:g}"
             yield (*criterion.at, "rate_hz"), fault
 

@@ -50,11 +50,38 @@ def value_warnings(criterion: WrittenCriterion, rubric: WrittenRubric) -> Iterat
     yield from _not_driven(criterion, rubric.handout)
     yield from _swapped_params(criterion)
     yield from _left_out(criterion)
+    if criterion.check == "reacts":
+        yield from _sooner_than_least(criterion)
     if criterion.check == "service-answers":
         yield from _swapped_answers(criterion)
     if criterion.check == "prints":
         yield from _all_numbers(criterion)
         yield from _of_another_run(criterion, rubric)
+
+
+def _sooner_than_least(criterion: WrittenCriterion) -> Iterator[Fault]:
+    """Yield a `least_s` that is longer than the pauses between messages each of which has to be answered: a node that
+    waits for silence answers only the last one."""
+    cause, least_s = as_map(criterion.given.get("cause")), criterion.given.get("least_s")
+    if cause.get("field") is not None or not is_number(least_s):
+        return
+    for _, step in as_maps(criterion.scenario.get("steps")):
+        sent = as_map(step.get("publish"))
+        rate_hz, count = sent.get("rate_hz", 10), sent.get("count")
+        is_one = count == 1 or (
+            count is None and "duration_s" not in sent and len(as_list(sent.get("values"))) < 2
+        )
+        if sent.get("topic") != cause.get("topic") or not is_number(rate_hz) or rate_hz <= 0:
+            continue
+        if (sent.get("background") is True or not is_one) and 1 / rate_hz < least_s:
+            gap_s = 1 / rate_hz
+            fault = (
+                f"each message on {cause['topic']} has to be answered, and the next one comes {gap_s:.2g} s after "
+                "it: a node that waits for silence answers only the last one. Ask for it in a run in which one message "
+                "is sent"
+            )
+            yield (*criterion.at, "least_s"), fault
+            return
 
 
 def early_waits(rubric: WrittenRubric) -> Iterator[Fault]:

@@ -598,3 +598,20 @@ def test_a_rate_may_be_that_of_a_parameter_which_the_run_sets(examples: Path) ->
     path.write_text(text, encoding="utf-8")
     told = warnings_of(load_rubric(str(path)), path.name)
     assert [one for one in told if "rate_hz" in one] == []
+
+
+def test_a_run_without_the_cause_may_have_another_rate(examples: Path) -> None:
+    """The rate before anything is sent, in a run of its own, and those that messages bring about."""
+    before = """  before:
+    title: Nothing is sent
+    start: [{name: monitor, script: scripts/battery_monitor.py}]
+    until: {topics: [/heartbeat], window_s: 6}
+  launched:
+"""
+    path = _spoiled(examples, "battery", "  launched:\n", before)
+    first = (
+        "  - {id: first, title: Before, bonus: 5, check: rate, scenario: before, requires: [executable],\n"
+    )
+    first += "     with: {topic: /heartbeat, rate_hz: 1}}\n"
+    path.write_text(path.read_text(encoding="utf-8").replace("  - {id: slow", f"{first}  - {{id: slow"))
+    assert not [one for one in warnings_of(load_rubric(str(path)), path.name) if "wants" in one]

@@ -9,9 +9,12 @@ from pathlib import Path
 import pytest
 
 from grader.arena.sandbox_files import (
+    COMPLETED,
     STANDIN_SOURCES,
     copy_standins,
     missing_packages,
+    packages_without_program,
+    prepare,
     standin_packages,
     with_standins,
 )
@@ -78,6 +81,21 @@ def test_a_copy_is_an_install_space_with_programs_that_run(tmp_path: Path) -> No
     }
     assert not list(folder.rglob("__pycache__"))
     assert all(p.stat().st_mode & 0o444 == 0o444 for p in folder.rglob("*"))
+
+
+def test_a_package_without_its_program_gets_the_graders(tmp_path: Path) -> None:
+    installed = _package(tmp_path / "ros" / "share" / "tf2_ros")
+    ros, (place, program) = _ros(tmp_path / "ros"), (tmp_path / "place", "static_transform_publisher")
+    assert [(folder, [p.name for p in found]) for folder, found in packages_without_program(ros)] == [
+        (installed, [program])
+    ]
+    prepare(place, ros)
+    completed = place / COMPLETED / "tf2_ros"
+    assert {path.name for path in completed.iterdir()} == {"package.xml", program}
+    assert os.access(completed / program, os.X_OK)
+    (tmp_path / "ros" / "lib" / "tf2_ros").mkdir(parents=True)
+    (tmp_path / "ros" / "lib" / "tf2_ros" / program).touch()
+    assert list(packages_without_program(ros)) == []
 
 
 def test_stand_ins_come_after_everything_else(tmp_path: Path) -> None:
