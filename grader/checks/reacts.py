@@ -13,7 +13,7 @@ from pydantic import Field, model_validator
 
 from grader.checks.registry import Refers, check
 from grader.checks.support.clocks import NEVER_LATE_S, excused, no_clock, run_seconds, why_late
-from grader.checks.support.conditions import Condition, is_called, said_of_calls, true_spans
+from grader.checks.support.conditions import Condition, is_called, old_until_s, said_of_calls, true_spans
 from grader.checks.support.fields import (
     Reading,
     changing_beside,
@@ -218,15 +218,15 @@ def _answers(
     answers, first = [], 0
     for number, at_ns in enumerate(starts):
         next_ns = starts[number + 1] if number + 1 < len(starts) else run.end_ns + 1
-        from_s = to_s(begun.get(at_ns, at_ns)) - ORDER_S
+        old_s = old_until_s(params.effect, effects, to_s, at_ns, params.least_s)
+        from_s = max(to_s(begun.get(at_ns, at_ns)) - ORDER_S, old_s)
         while first < len(came) and to_s(came[first]) < from_s:
             first += 1
         after_s = to_s(came[first]) - to_s(at_ns) if first < len(came) else math.inf
         # A late answer still is one, whose delay can be told, until the next cause begins.
         if after_s <= params.within_s or (after_s < math.inf and came[first] < next_ns):
             answers.append(Answer(at_ns, max(0.0, after_s)))
-            # Where each message is a cause, an effect answers one of them alone.
-            first += each
+            first += each  # where each message is a cause, an effect answers one of them alone
         # Too near to the end, an answer may still have been on its way.
         elif to_s(until_ns) - to_s(at_ns) >= params.within_s:
             answers.append(Answer(at_ns, None))

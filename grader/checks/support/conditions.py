@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import groupby
 from typing import Annotated, Literal
 
@@ -160,6 +161,19 @@ def how_shown(run: Run, cause: Condition) -> str:
     command = "rosservice call" if is_called(run, cause.topic) else "rostopic echo"
     command = f"{command} {cause.topic}"
     return f"`{command}` shows what comes"
+
+
+def old_until_s(
+    effect: Condition, effects: Sequence[Reading], to_s: Callable[[int], float], at_ns: int, least_s: float
+) -> float:
+    """Return until when messages say what they said before a cause: a node that publishes its state all the time may do
+    so once more before it hears of the cause, and that is no answer to it."""
+    before = next((one for one in reversed(effects) if one.time_ns <= at_ns), None)
+    if not least_s or before is None or not effect.holds(before):
+        return -math.inf
+    other = next((one for one in effects if one.time_ns > at_ns and not effect.holds(one)), None)
+    is_soon = other is not None and to_s(other.time_ns) - to_s(at_ns) < least_s
+    return to_s(other.time_ns) if other is not None and is_soon else -math.inf
 
 
 def true_spans(cause: Condition, causes: Sequence[Reading], run: Run) -> list[tuple[int, int]]:
