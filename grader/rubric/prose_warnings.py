@@ -93,7 +93,7 @@ def prose_warnings(rubric: WrittenRubric) -> Iterator[Fault]:
         yield from _other_range(criterion, handout)
         yield from _other_node(criterion, handout)
         yield from _other_types(at, given, handout)
-        yield from _misspelt_keys(at, given, rubric)
+        yield from _misspelt_keys(criterion, rubric)
         if check in {"node-lives", "node-name", "launch-runs"}:
             yield from _unsaid_node(at, given, rubric)
         yield from _other_text(criterion, rubric, TEXTS.get(check, VALUES))
@@ -330,9 +330,15 @@ def _sent_otherwise(rubric: WrittenRubric) -> Iterator[Fault]:
     in another case."""
     handout = rubric.handout
     quoted = sorted({*re.findall(r"`([^`]+)`", handout)})
+    lines = {str(one.get("line")) for _, kind, one in rubric.parts() if kind == "type"}
+    keys = {text for text in quoted if len(text) == 1}
+    # Where keys are typed, a word in place of one of them is another line.
+    untyped = keys - lines if len(keys & lines) > 1 else set()
     for path, kind, one in rubric.parts():
         line = str(one.get("line")) if kind == "type" else ""
-        other = next((text for text in quoted if text.lower() == line.lower()), "")
+        other = next(
+            (text for text in quoted if text.lower() == line.lower() or line[:1] in untyped & {text}), ""
+        )
         if other and line not in quoted:
             yield (*path, "line"), f"the handout has `{other}`"
         if kind in {"call", "serve", "publish"}:
@@ -391,11 +397,12 @@ def _plain(kind: object) -> str:
     return str(kind).rpartition("/")[2].lower()
 
 
-def _misspelt_keys(at: KeyPath, given: dict[str, Any], rubric: WrittenRubric) -> Iterator[Fault]:
-    """Yield constants and nodes of which a part is one letter off from a word of the handout, and that no other line
-    has."""
-    handout = rubric.handout
+def _misspelt_keys(criterion: WrittenCriterion, rubric: WrittenRubric) -> Iterator[Fault]:
+    """Yield constants and nodes of which a part is one letter off from a word of the handout or the run, and that no other
+    line has."""
+    at, given, handout = criterion.at, criterion.given, rubric.handout
     words = set(re.findall(r"\w+", handout))
+    of_run = {word for _, text in texts_in((), criterion.scenario) for word in re.findall(r"\w+", text)}
     texts = [text for _, text in rubric.texts]
     for name, value in as_map(given.get("constants")).items():
         said = re.search(rf"\b{re.escape(str(name))}\b[^\w,.-]{{0,5}}(-?\d+)\b", handout)
@@ -404,11 +411,12 @@ def _misspelt_keys(at: KeyPath, given: dict[str, Any], rubric: WrittenRubric) ->
     for key in ("constants", "nodes"):
         for name in as_map(given.get(key)):
             for part in filter(None, str(name).split("/")):
-                alike = (one for one in sorted(words) if is_slip(part, one) or one.lower() == part.lower())
-                near = next(alike, "")
+                known = (*sorted(words), *sorted(of_run))
+                near = next((one for one in known if is_slip(part, one) or one.lower() == part.lower()), "")
                 times = sum(len(re.findall(rf"\b{re.escape(part)}\b", text)) for text in texts)
                 if part not in words and near and times == 1:
-                    fault = f'{part} is on no other line: did you mean "{near}", as in the handout?'
+                    where = "the handout" if near in words else "its run"
+                    fault = f'{part} is on no other line: did you mean "{near}", as in {where}?'
                     yield (*at, key, name), fault
 
 
@@ -477,7 +485,7 @@ def _other_text(criterion: WrittenCriterion, rubric: WrittenRubric, keys: tuple[
         alike += [one for one in quoted if sorted(one.lower().split()) == sorted(text.lower().split())]
         others = [one for other in rubric.criteria for _, one in texts_in((), other.given) if one != text]
         others = [one for one in others if not NAME.fullmatch(one)]
-        words = [one for one in quoted if _differ_in_a_word(one, text)]
+        words = [one for one in quoted if _differ_in_a_word(one, text) or _is_part(one, text)]
         words = [one for one in words if not any(re.search(_as_pattern(other), one) for other in others)]
         if alike or words:
             is_same = bool(alike) and alike[0].lower() == text.lower()
@@ -501,6 +509,15 @@ def _differ_in_a_word(said: str, text: str) -> bool:
     differing = [pair for pair in zip(one, other, strict=False) if pair[0] != pair[1]]
     is_text = len(one) == len(other) > 1 and len(differing) == 1 and not NAME.fullmatch(said)
     return is_text and all(word.isalpha() for word in differing[0])
+
+
+def _is_part(said: str, text: str) -> bool:
+    """Return whether one of two words is in the other: `bye` and `Goodbye`."""
+    short, long = sorted((said.lower(), text.lower()), key=len)
+    return len(short) >= PART_MIN and short in long and said.isalpha() and text.isalpha()
+
+
+PART_MIN = 3
 
 
 def _is_begun(said: str, text: str) -> bool:

@@ -197,3 +197,46 @@ def test_what_may_be_a_slip_in_one_is_a_warning(
 ) -> None:
     (found,) = _warnings(tmp_path, handout, scenarios, asked)
     assert warning in found
+
+
+KEYS = """\
+  keys:
+    title: Keys
+    start: [{name: drive, script: drive.py}]
+    steps:
+      - type: {process: drive, line: w}
+      - type: {process: drive, line: s}
+      - type: {process: drive, line: k}
+      - type: {process: drive, line: q}
+    until: {ended: [drive]}
+  launched:
+    title: Launched
+    start: [{name: all, launch: all.launch, args: ["robot:=waffle"]}]
+    until: {nodes: 1}"""
+ASKED = """\
+  - {id: says, title: It says so, points: 50, check: prints, with: {process: drive, text: bye}, scenario: keys}
+  - {id: up, title: It comes up, points: 50, check: launch-runs, scenario: launched,
+     with: {launch: all.launch, nodes: {/waffle/drive: lab1}}}"""
+TYPED = "Write `drive` (drive.py), which all.launch starts: `w` drives, `s` stops, and at `q` it prints `bye` and ends."
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "warning"),
+    [
+        ("line: q", "line: quit", "type.line: the handout has `q`"),
+        ("text: bye", "text: Goodbye", "text: the handout has `bye`, with another word"),
+        (
+            "/waffle/",
+            "/wafle/",
+            '/wafle/drive: wafle is on no other line: did you mean "waffle", as in its run?',
+        ),
+    ],
+)
+def test_what_nothing_else_says_is_a_warning(old: str, new: str, warning: str, tmp_path: Path) -> None:
+    text = RUNS.format(handout=f"'{TYPED}'", scenarios=KEYS, criteria=ASKED)
+    path = tmp_path / "lab.yaml"
+    path.write_text(text, encoding="utf-8")
+    assert warnings_of(load_rubric(str(path)), path.name) == []
+    path.write_text(text.replace(old, new, 1), encoding="utf-8")
+    (told,) = warnings_of(load_rubric(str(path)), path.name)
+    assert told.endswith(warning)
