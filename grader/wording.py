@@ -253,6 +253,16 @@ SWAPPED = re.compile(r"on line (\d+), swap the two values in the brackets of `(\
 """The line and the function in the fix of arguments in the wrong order, which `package/lint` writes."""
 
 
+NO_SEMICOLON = re.compile(r"write a `;` at the end of (?:that line|the last line of code above line (\d+))")
+"""The line below, if any, in a hint of `ask_semicolon`."""
+
+
+def ask_semicolon(below: str = "") -> str:
+    """Return the hint on a statement that has no end: on the line that is named, or above the line `below`."""
+    where = f"the last line of code above line {below}" if below else "that line"
+    return f"write a `;` at the end of {where}"
+
+
 def ask_rate(hz: str, where: str, right: str) -> str:
     """Return the hint on a line that asks for another rate: `make it 10 Hz in a.py, line 3: use rospy.Rate(10)`."""
     return f"make it {hz} Hz in {where}: use {right}"

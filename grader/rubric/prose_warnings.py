@@ -398,8 +398,8 @@ def _plain(kind: object) -> str:
 
 
 def _misspelt_keys(criterion: WrittenCriterion, rubric: WrittenRubric) -> Iterator[Fault]:
-    """Yield constants and nodes of which a part is one letter off from a word of the handout or the run, and that no other
-    line has."""
+    """Yield constants and nodes of which a part is one letter off from a word of the handout or of the run, and that no
+    other line has."""
     at, given, handout = criterion.at, criterion.given, rubric.handout
     words = set(re.findall(r"\w+", handout))
     of_run = {word for _, text in texts_in((), criterion.scenario) for word in re.findall(r"\w+", text)}

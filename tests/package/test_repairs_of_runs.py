@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from grader.package.repairs.of_runs import conversions, other_field, repairs_by_hint
-from grader.wording import ask_field, ask_rate, ask_type, fields_told, suspect_field
+from grader.wording import ask_field, ask_rate, ask_semicolon, ask_type, fields_told, suspect_field
 
 
 @pytest.mark.parametrize(
@@ -97,3 +97,18 @@ def test_two_values_are_swapped(line: str, right: str, tmp_path: Path) -> None:
     (tmp_path / "a.py").write_text(f"{line}\n")
     hint = "on line 1, swap the two values in the brackets of `atan2`"
     assert [one.after for one in repairs_by_hint(tmp_path, hint, "a.py", 1)] == ([right] if right else [])
+
+
+@pytest.mark.parametrize(
+    ("line", "below", "right"),
+    [
+        (2, "", "  f();  // first"),
+        (2, "4", "  f();  // first"),
+        (1, "", ""),
+        (1, "6", ""),
+    ],
+)
+def test_a_semicolon_of_a_cpp_file(line: int, below: str, right: str, tmp_path: Path) -> None:
+    (tmp_path / "a.cpp").write_text("int main() {\n  f()  // first\n\n  g();\n  // the end\n}\n")
+    found = repairs_by_hint(tmp_path, ask_semicolon(below), "a.cpp", line)
+    assert [(one.kind, one.line, one.after) for one in found] == ([("build-line", 2, right)] if right else [])

@@ -19,7 +19,7 @@ from grader.checks.support.text import near_names, shown
 from grader.installable import noetic_messages
 from grader.model.package import CMAKE, PackageFacts
 from grader.model.verdict import FileCitation
-from grader.wording import ON_THE_MACHINE, on_lines, there_is
+from grader.wording import ON_THE_MACHINE, ask_semicolon, on_lines, there_is
 
 _CMAKE_ERROR = re.compile(
     r"^CMake Error(?: at (?P<file>[^:()]+):(?P<line>\d+)(?: \((?P<call>\w+)\))?)?:?\s*(?P<text>.*)"
@@ -221,8 +221,8 @@ def _no_semicolon(found: re.Match[str], _package: PackageFacts, lines: Sequence[
     if found[2] == ")":
         why = f"{found.string}: there is a `)` that no `(` opens"
         return Explained(why, "on that line, write the `(` that is missing, or delete a `)`")
-    where = f"of the statement before `{found[2]}`" if found[1] else "of that line"
-    return Explained(f"{found.string}: a `;` is missing", f"write a `;` at the end {where}")
+    hint = f"write a `;` at the end of the statement before `{found[2]}`" if found[1] else ask_semicolon()
+    return Explained(f"{found.string}: a `;` is missing", hint)
 
 
 def _no_bracket(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
@@ -310,8 +310,7 @@ def _no_semicolon_above(found: re.Match[str], _package: PackageFacts, lines: Seq
     place = re.search(r":(\d+):", found.string)
     if not _source(found, lines).startswith(found[1]):
         return Explained(found.string, FIRST_ERROR_HINT)
-    hint = f"write a `;` at the end of the last line of code above line {place[1] if place else ''}"
-    return Explained(f"{found.string}: a `;` is missing above it", hint)
+    return Explained(f"{found.string}: a `;` is missing above it", ask_semicolon(place[1] if place else ""))
 
 
 _OUTSIDE = re.compile(

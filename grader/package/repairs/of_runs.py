@@ -10,7 +10,7 @@ from pathlib import Path
 
 from grader.model.repair import Repair
 from grader.package.repairs.editing import Files
-from grader.wording import ASKED_RATE, ASKED_TYPE, CONVERTED, SWAPPED, TEXT_PLACE, convert
+from grader.wording import ASKED_RATE, ASKED_TYPE, CONVERTED, NO_SEMICOLON, SWAPPED, TEXT_PLACE, convert
 
 
 def repairs_by_hint(folder: Path, hint: str, file: str, line: int) -> list[Repair]:
@@ -21,6 +21,8 @@ def repairs_by_hint(folder: Path, hint: str, file: str, line: int) -> list[Repai
         return message_type(folder, file, line, asked[1], asked[2])
     if (turned := SWAPPED.search(hint)) is not None:
         return swapped_arguments(folder, file, int(turned[1]), turned[2])
+    if (end := NO_SEMICOLON.search(hint)) is not None:
+        return with_semicolon(folder, file, int(end[1]) - 1 if end[1] else line)
     if TEXT_PLACE in hint:
         return text_place(folder, file, line)
     told = CONVERTED.search(hint)
@@ -115,6 +117,22 @@ def swapped_arguments(folder: Path, file: str, line: int, function: str) -> list
 
 ARGUMENT = r"(?:[^(),]|\([^()]*\))+"
 """With brackets in it that have none themselves."""
+
+
+def with_semicolon(folder: Path, file: str, line: int) -> list[Repair]:
+    """Return the repair that ends the statement of the last line of code up to this one of a C++ file."""
+    files = Files(folder=folder.resolve())
+    lines = (files.text(file) or "").split("\n")[:line]
+    codes = [one.partition("//")[0].rstrip() for one in lines]
+    at = next((i for i in range(len(codes) - 1, -1, -1) if codes[i].strip()), None)
+    if at is None or codes[at].endswith((";", "{", "*/")):
+        return []
+    after = (files.text(file) or "").split("\n")
+    after[at] = f"{codes[at]};{lines[at][len(codes[at]) :]}"
+    files.change(
+        "build-line", file, "\n".join(after), f"line {at + 1} of {file}: a `;` is missing at its end"
+    )
+    return list(files.repairs)
 
 
 def other_field(folder: Path, file: str, field: str, other: str) -> Repair | None:
