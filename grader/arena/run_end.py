@@ -349,6 +349,8 @@ ANSWERING_S, RAISED_S = 1.0, 0.5
 """So long after the last message, programs that only wait for callbacks have done what they do for it (`spin()` wakes
 twice a second, and one that sleeps for longer is not at rest), and where it ended in an exception."""
 COMPUTING_S, IN_VAIN_S = 0.5, 0.25
+ENDING_S = 2.5
+"""So long after what was typed or sent last, a program that waits may yet end: rospy waits for its threads then."""
 LATE_MOST = 0.25
 """A program at rest gets the processor when it wants it: that others fill the machine makes the wait longer by this
 share of it at most."""
@@ -527,8 +529,8 @@ def _longer(live: RunState, patience_s: float) -> float:
 
 def goes_on(live: RunState, process: str, now_s: float) -> bool:
     """Return whether a process that is at rest will not end by itself: it only waits for callbacks, or works or waits
-    without end."""
-    rest = live.at_rest.get(process)
-    spins = rest is not None and rest.kind == "spins" and not live.naps
+    without end, and has had its time for what was typed or sent last."""
+    rest, may_end = live.at_rest.get(process), bool(live.sent_s) and now_s <= live.sent_s + ENDING_S
+    spins = rest is not None and rest.kind == "spins" and not live.naps and not may_end
     endless = (spins or computes(live, process)) and not is_fed(live, now_s)
     return endless or _waits_for_nothing(live, process)

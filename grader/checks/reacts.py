@@ -13,7 +13,16 @@ from pydantic import Field, model_validator
 
 from grader.checks.registry import Refers, check
 from grader.checks.support.clocks import NEVER_LATE_S, excused, no_clock, run_seconds, why_late
-from grader.checks.support.conditions import Condition, is_called, old_until_s, said_of_calls, true_spans
+from grader.checks.support.conditions import (
+    Condition,
+    is_called,
+    keep_time,
+    old_until_s,
+    said_of_calls,
+    shown_on,
+    true_spans,
+    unless_ended,
+)
 from grader.checks.support.fields import (
     Reading,
     changing_beside,
@@ -153,11 +162,12 @@ def reacts(package: PackageFacts, run: Run, params: ReactsParams) -> Verdict:
         or passed(f"{plural(len(answers), 'time')}, {params.effect.words} follows {params.trigger.words}")
     )
     verdict = _with_ranges(package, run, params, causes, verdict)
+    verdict = unless_ended(package, run, verdict, [one.at_ns for one in answers], params.within_s)
     span = (answers[0].at_ns, answers[-1].at_ns) if answers else (None, None)
     verdict = verdict.about(
         expected=params.expected,
         measured=verdict.measured or _measured(answers),
-        citations=(cite(run, _shown_on(run, params), *span), cite(run, params.effect.topic)),
+        citations=(cite(run, shown_on(run, params.trigger), *span), cite(run, params.effect.topic)),
     )
     return said_of_calls(run, params.cause, verdict)
 
@@ -187,11 +197,6 @@ def _with_ranges(
     around = "read all of them: `min(…)` is the smallest" if not has_angles(scan) else ""
     hint = around or read_too(scan, index, reads)
     return verdict.explained(seen + join_words(said), hint, tuple(one.place for one in reads))
-
-
-def _shown_on(run: Run, params: ReactsParams) -> str:
-    """Return where the evidence has the causes: a service's calls are among what the grader did."""
-    return "/grader/actor" if is_called(run, params.trigger.topic) else params.trigger.topic
 
 
 def _causes(run: Run, params: ReactsParams) -> list[Reading]:
@@ -540,31 +545,26 @@ def _other_answer(
 
 def _too_soon(answers: Sequence[Answer], run: Run, params: ReactsParams) -> Verdict | None:
     """Return the verdict where an effect comes before it may."""
-    soon = [
-        one
-        for one in answers
-        if one.after_s is not None and one.after_s < params.least_s - ORDER_S * run.warp
-    ]
+    least_s = params.least_s - ORDER_S * run.warp
+    soon = [one for one in answers if one.after_s is not None and one.after_s < least_s]
     if not soon:
         return None
     after_s = min(one.after_s or 0.0 for one in soon)
     often = f"{len(soon)} of {plural(len(answers), 'time')}, " if len(answers) > 1 else ""
     comes = f"{often}{params.effect.words} comes {after_s:.2f} s after {params.trigger.words}"
-    least = f"{significant(params.least_s)} s"
-    hint = f"keep the time of the message, and see in the loop or a timer whether {least} have passed since"
-    verdict = failed(f"{comes}, sooner than {least}", hint=hint).if_repeated()
-    return (
-        excused(verdict, run, soon[0].at_ns, run.end_ns, why_late)
-        if after_s > params.least_s / 2
-        else verdict
-    )
+    message = f"{comes}, sooner than {significant(params.least_s)} s"
+    verdict = failed(message, hint=keep_time(params.least_s)).if_repeated()
+    is_near = after_s > params.least_s / 2
+    return excused(verdict, run, soon[0].at_ns, run.end_ns, why_late) if is_near else verdict
 
 
 def _judge_unanswered(
     answers: Sequence[Answer], run: Run, params: ReactsParams, instead: tuple[str, ...] | None
 ) -> Verdict | None:
     hint = f"each time that {params.trigger.words} comes, publish {params.effect.words}"
-    hint = f"{hint}, in the callback of {params.trigger.topic}"
+    hint = (
+        keep_time(params.least_s) if params.least_s else f"{hint}, in the callback of {params.trigger.topic}"
+    )
     if is_called(run, params.trigger.topic):
         hint = f"look at what the callback of {params.trigger.topic} sets: {params.effect.words} has to follow a call"
     if params.of != "student":

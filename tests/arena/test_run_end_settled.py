@@ -413,3 +413,10 @@ def test_a_call_is_given_up_where_all_programs_compute() -> None:
     assert all_compute(_resting(node=("stuck", 1)))
     assert not all_compute(_resting(node=("stuck", 1), other=("spins", 1)))
     assert not all_compute(RunState())
+
+
+def test_who_was_typed_to_may_yet_end() -> None:
+    live, until = _resting(node=("spins", 1)), Until(ended=("node",), silent_s=60)
+    live.sent_s = 21.0  # a line was typed
+    assert find_outcome(live, until, 23.4) is None
+    assert find_outcome(live, until, 23.6) == ("silent", "the graph has settled")

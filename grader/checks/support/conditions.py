@@ -10,6 +10,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
+from grader.checks.support.exit_causes import explain_end
 from grader.checks.support.fields import (
     FieldPath,
     Reading,
@@ -21,12 +22,13 @@ from grader.checks.support.fields import (
     refuse_disorder,
     value_text,
 )
-from grader.checks.support.processes import GlobalName, observed_until_ns
+from grader.checks.support.processes import GlobalName, early_end, observed_until_ns
 from grader.checks.support.services import exchanges
 from grader.evidence.events import NOT_OFFERED
 from grader.evidence.run import Channel, Run
+from grader.model.package import PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import Verdict
+from grader.model.verdict import Status, Verdict
 from grader.wording import significant
 
 
@@ -174,6 +176,37 @@ def old_until_s(
     other = next((one for one in effects if one.time_ns > at_ns and not effect.holds(one)), None)
     is_soon = other is not None and to_s(other.time_ns) - to_s(at_ns) < least_s
     return to_s(other.time_ns) if other is not None and is_soon else -math.inf
+
+
+def keep_time(least_s: float) -> str:
+    """Return the hint on an answer that is due only after a time."""
+    passed_s = f"{significant(least_s)} s"
+    return (
+        f"keep the time of the message, and see in the loop or a timer whether {passed_s} have passed since"
+    )
+
+
+def unless_ended(
+    package: PackageFacts, run: Run, verdict: Verdict, causes_ns: Sequence[int], within_s: float
+) -> Verdict:
+    """Return a lost mark with the exception that ended the node before it could answer any of these causes."""
+    ended = early_end(run) if verdict.status is Status.FAIL and not verdict.basis.cause else None
+    if ended is None or ended.end_ns is None or not causes_ns:
+        return verdict
+    end = explain_end(ended, run, package)
+    is_before = ended.end_ns <= causes_ns[0] + round((within_s + ENDING_S) * 1e9)
+    if not is_before or not end.raised:
+        return verdict
+    return end.explain(verdict, f"{verdict.message}; then the node ends: {end.cause}")
+
+
+ENDING_S = 1.0
+"""So long Python may take to end after an exception."""
+
+
+def shown_on(run: Run, cause: Condition) -> str:
+    """Return where the evidence has the causes: a service's calls are among what the grader did."""
+    return "/grader/actor" if is_called(run, cause.topic) else cause.topic
 
 
 def true_spans(cause: Condition, causes: Sequence[Reading], run: Run) -> list[tuple[int, int]]:
