@@ -346,6 +346,6 @@ def _too_few(count: Count, steps: int, run: Run, package: PackageFacts, params: 
     if count.period_ns * params.rate_hz < SLOW * 1e9:
         longer = f"let the run last for {params.min_steps + 1} values"
         return inconclusive(message, hint=f"{NOTHING_TO_DO}tell your instructor. In the rubric: {longer}")
-    return failed_or_blocked(
-        f"{message}: it is too slow", hint=f"publish at {significant(params.rate_hz)} Hz"
-    )
+    is_asked = "rate_hz" in params.model_fields_set  # else another criterion may ask for another rate
+    hint = f"publish at {significant(params.rate_hz)} Hz" if is_asked else "publish more often"
+    return failed_or_blocked(f"{message}: it is too slow", hint=hint)

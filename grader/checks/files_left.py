@@ -274,6 +274,14 @@ def _short(verdict: Verdict, run: Run, count: int, least: int) -> Verdict:
     return excused(once, run, run.start_ns, run.end_ns, why_late) if 2 * count >= least else once
 
 
+OTHER_SIGNS = (";", "\t", "|", " ")
+"""What programs write between values in place of a comma."""
+
+
+def _words_apart(names: Sequence[str], sign: str) -> set[str]:
+    return {word.strip() for name in names for word in name.split(sign)}
+
+
 def _table(file: LeftFile, params: FileLeftParams, run: Run) -> Verdict | None:
     data = file.data or b""
     if len(data) > TABLE_BYTES_MAX:
@@ -288,7 +296,9 @@ def _table(file: LeftFile, params: FileLeftParams, run: Run) -> Verdict | None:
     if lacking:
         first = shown(",".join(names)) or "empty"
         message = f"{file.path} has no column {join_words(lacking)}; its first row is {first}"
-        verdict = failed(message, hint=f"begin with the row {','.join(params.columns)}")
+        apart = next((sign for sign in OTHER_SIGNS if {*params.columns} <= _words_apart(names, sign)), "")
+        hint = f"write a comma between the values, not {apart!r}" if apart else ""
+        verdict = failed(message, hint=hint or f"begin with the row {','.join(params.columns)}")
         return verdict.seeking("quoted", *(one for one in names if one not in params.columns))
     values = rows[1:] if params.columns else rows
     if len(values) < params.rows_at_least:

@@ -36,6 +36,7 @@ from grader.checks.support.topics import (
     cite,
     nothing_sent,
     sent_by,
+    unheard,
 )
 from grader.evidence.run import Channel, Run
 from grader.model.message_rate import ROUNDING, RateBounds, Rhythm
@@ -203,8 +204,9 @@ def _without_messages(
     elif is_all and any(map(cause.holds, cause.come_in(run))):
         yield grade_again(f"{words} lasted too short a time to judge the rate of {params.topic}")
     elif is_all:
-        hint = f"{how_shown(run, cause)} while your node runs"
-        yield failed_or_blocked(absent_in(run, cause), hint=hint).if_repeated()
+        deaf, absent = unheard(run), absent_in(run, cause)
+        hint = deaf.hint if deaf else f"{how_shown(run, cause)} while your node runs"
+        yield failed_or_blocked(f"{absent}: {deaf.message}" if deaf else absent, hint=hint).if_repeated()
 
 
 def _excuse_lateness(
@@ -478,9 +480,9 @@ def _with_line(verdict: Verdict, slip: PythonSlip, params: RateParams) -> Verdic
 
 def _slips(run: Run, package: PackageFacts, params: RateParams, *kinds: SlipKind) -> list[PythonSlip]:
     """Return what is remarkable, of these kinds, in the scripts of the topic's publishers. Where the rate changes, a
-    line that asks for another one may be right at another time."""
+    line that asks for another one may be right at another time; a rate for a time never is."""
     if params.cause is not None:
-        kinds = tuple(kind for kind in kinds if not kind.startswith("rate-"))
+        kinds = tuple(kind for kind in kinds if kind == "rate-as-time" or not kind.startswith("rate-"))
     channels = run.student_channels(params.topic)
     return [s for c in channels for s in slips_of(package, run, c.callerid, *kinds)]
 
@@ -496,8 +498,7 @@ def _asked_number(found: Rhythm, run: Run, package: PackageFacts, params: RatePa
 def _by_parameter(
     verdict: Verdict, run: Run, package: PackageFacts, params: RateParams, mean_hz: float
 ) -> Verdict:
-    """Say where the value comes from, if the rate of the node's loop is a parameter with another value than the asked
-    one: by the script's line, or because the node reads one that is the rate which was measured."""
+    """Say that the loop's rate is a parameter of another value: by the script's line, or as one that the node reads."""
     if params.cause is not None:
         pause = f"with {words_in(run, params.cause)}, wait {significant(1 / params.rate_hz)} s between two messages"
         verdict = verdict.model_copy(update={"hint": f"look at how the loop changes its rate: {pause}"})
