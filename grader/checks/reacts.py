@@ -149,7 +149,6 @@ def reacts(package: PackageFacts, run: Run, params: ReactsParams) -> Verdict:
     effects = [e for e in params.effect.read(own) if e.time_ns <= (observed_until_ns(run) or run.end_ns)]
     answers = _answers(run, causes, effects, params)
     instead = _instead(causes, effects, params) or _other_answer(answers, causes, effects, own, params)
-    instead = instead if params.of == "student" else None
     verdict = (
         # Whether an answer is missing can be said only where effects and causes were there to be seen.
         _nothing_to_judge(package, run, effects, own, params)
@@ -584,7 +583,8 @@ def _judge_unanswered(
     late = max((one.after_s for one in slow if one.after_s is not None), default=None)
     due = _due(slow, params)
     if late is None and len(slow) == len(answers):
-        seen, hint, *fields = (f"; {instead[0]}", *instead[1:]) if instead else ("", hint)
+        is_own = instead is not None and params.of == "student"
+        seen, hint, *fields = (f"; {instead[0]}", *instead[1:]) if instead and is_own else ("", hint)
         verdict = failed(f"{reaction.format('never follows')}, which came {times}{seen}", hint=hint).late(due)
         verdict = verdict.seeking("field", *fields)
         # A single answer may have been lost on its way.
