@@ -16,7 +16,7 @@ from grader.checks.support.clocks import excused, why_late
 from grader.checks.support.launch import finished, nodes_up
 from grader.checks.support.launch_slips import Slip, own_script
 from grader.checks.support.processes import TYPES_HINT, disputed_types, run_scripts
-from grader.checks.support.text import SPIN
+from grader.checks.support.text import LOOP, SPIN
 from grader.checks.support.topics import End, nodes_on, topics_with
 from grader.evidence.events import GraphEvent
 from grader.evidence.run import Run
@@ -420,7 +420,10 @@ def ended_by_itself(
         verdict = failed(f"{message}: {left.message}", hint=left.fix, citations=(left.place,))
     else:
         cited = tuple(FileCitation(file=n.file or file.path, line=n.line) for n in ended)
-        verdict = failed(message, hint=f"keep it alive: end with {SPIN}", citations=cited)
+        names = {n.full_name for n in ended}
+        talks = any(c.messages for c in run.student_channels() if c.callerid in names)
+        alive = f"publish in a loop `{LOOP}`" if talks else f"end with {SPIN}"
+        verdict = failed(message, hint=f"keep it alive: {alive}", citations=cited)
     if left is not None and left.kind == "never-begun":
         return verdict.if_repeated()  # it ends as soon on any machine
     # on a quicker machine, the others may connect to it before it ends
