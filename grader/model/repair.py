@@ -73,7 +73,7 @@ TYPED = "write `input` in place of `raw_input`"
 
 
 class Repair(Record):
-    """One mistake, and how it is repaired. Logic is not repaired, but for a clock, a rate and one sign."""
+    """One mistake, and how it is repaired. Logic is not repaired, but for a clock, a rate, a sign and a field."""
 
     kind: RepairKind
     """What kind of repair it is, as in the rubric's `repairs`."""
