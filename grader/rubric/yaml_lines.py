@@ -352,7 +352,8 @@ def _yaml_fault(error: yaml.YAMLError, text: str, name: str) -> str:
         if "but got ':'" in str(error) and begun and mark and begun.line == mark.line:
             problem = "text with a colon needs quotes; else a comma is missing"
         lines = text.splitlines()[begun.line : mark.line + 1] if begun and mark else []
-        if "is not closed" in problem and any(re.search(r"[^\s#].*\s#", one) for one in lines):
+        before = (one.replace("\t#", " #").rpartition(" #")[0] for one in lines)
+        if "is not closed" in problem and any(text.strip(" \t#") for text in before):
             problem += "; what comes after a blank and # is a comment: text with # needs quotes"
     return f"{name}:{mark.line + 1 if mark else 1}: {problem}"
 
