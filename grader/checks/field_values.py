@@ -273,8 +273,8 @@ def field_equals(package: PackageFacts, run: Run, params: FieldEqualsParams) -> 
     return verdict.about(expected=expected, measured=verdict.measured or _values(asked), citations=cited)
 
 
-def _is_turned(found: Sequence[Reading], params: FieldEqualsParams) -> bool:
-    """Return whether all the values come in their order, with the other sign."""
+def _has_other_sign(found: Sequence[Reading], params: FieldEqualsParams) -> bool:
+    """Return whether all the values come in their order, each with the opposite sign."""
     numbers = [v for v in params.values if isinstance(v, int | float) and not isinstance(v, bool)]
     readings = iter(found)
     in_order = all(any(params.is_at(one, -value) for one in readings) for value in numbers)
@@ -290,9 +290,9 @@ def _in_order(
     verdict = text if found is not sent else passed(f"{what} is {params.words}")
     for number, value in enumerate(params.values):
         here = next((n for n in range(at, len(found)) if params.is_at(found[n], value)), None)
-        if here is None and _is_turned(found, params):
-            message = f"{what} has the other sign: {_values(found)}, where {params.words} is asked for"
-            verdict = failed(message, hint=f"turn the sign of {params.field} around")
+        if here is None and _has_other_sign(found, params):
+            message = f"{what} has the opposite sign: {_values(found)}, where {params.words} is asked for"
+            verdict = failed(message, hint=f"reverse the sign of {params.field}")
             break
         if here is None and len(found) == len(params.values):  # none is missing: each has its place
             verdict = _in_another_order(found, params)

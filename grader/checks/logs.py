@@ -235,13 +235,12 @@ def _silent(package: PackageFacts, run: Run, nodes: tuple[str, ...], params: Log
     if slip := next(debug, None):
         message = f"{message}: `rospy.{slip.name}` on line {slip.line} of {slip.file} is not sent"
         return failed(message, hint=f"on line {slip.line}, {_call(params)}", citations=(slip.place,))
-    slip = _hindered(package, run, params)
-    asked = {event.topic for _, event in run.actors if event.action == "note" and event.topic}
-    deaf = next(filter(None, (refused_type(run, topic, package) for topic in sorted(asked))), None)
-    if slip and deaf:
-        verdict = failed(f"{message}: {deaf.message}", hint=deaf.hint, citations=deaf.citations)
-        return verdict.caused_by(deaf)
-    if slip:
+    if slip := _hindered(package, run, params):
+        noted = sorted({event.topic for _, event in run.actors if event.action == "note" and event.topic})
+        # What would be logged upon a message waits for one that cannot come.
+        if deaf := next(filter(None, (refused_type(run, topic, package) for topic in noted)), None):
+            verdict = failed(f"{message}: {deaf.message}", hint=deaf.hint, citations=deaf.citations)
+            return verdict.caused_by(deaf)
         message = f"{message}: line {slip.line} of {slip.file} would, and it is not reached"
         hint = f"in {slip.file}, {slip.fix}"
         # To log whether or not the condition holds would be wrong where the text answers what the grader sends.

@@ -489,7 +489,7 @@ WORDS: dict[Cause, tuple[str, str]] = {
     "quotes": ("{place}: quotes are missing around {word}", ""),
     "attribute": ("{place}: there is no {word}", ""),
     "value": ("{place}: {word} is given a value with `=`, and has to be called", ""),
-    "time": ("{place}: {word} must be a time of ROS, not a number", ""),
+    "time": ("{place}: {word} must be a ROS time, not a number", ""),
     "call": ("{place}: {word} is named but not called", "write {calls}"),
     "quoted": ("{place}: {word} is in quotes, so it never runs", ""),
     "comment": ("{place}: `{word}` is commented out", "remove the `#` from line {line}"),
