@@ -374,6 +374,8 @@ def verdict_of(criterion: Criterion, facts: Facts, checks: Mapping[str, Check] =
                 run = asked.get("run")
                 found = explain_loss(check, facts.package_of(criterion), run, found)
                 found = _of_the_build(criterion, facts, run, found)
+        if found.status is Status.PASS and not found.hint:  # what follows completes hints
+            return _with_package_name(found, criterion, facts)
         found = fill_slots(choose_hint_language(found, criterion, facts), criterion, facts.rubric)
         found = name_other_imports(name_other_lines(found, facts), criterion, facts)
         found = allow_typing(name_other_parameters(found, criterion, facts), criterion, facts)
