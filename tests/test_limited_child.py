@@ -35,7 +35,7 @@ OF_REPAIRS = {
     "package.lint.script_spellings",
     "package.lint.script_tree",
     "package.python_repairs",
-    "package.python_repairs.calls",
+    "package.python_repairs.blocks", "package.python_repairs.calls",
     "package.python_repairs.examine",
     "package.python_repairs.imports",
     "package.python_repairs.lines_outside",

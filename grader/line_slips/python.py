@@ -12,7 +12,7 @@ import keyword
 import os
 import re
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from difflib import get_close_matches
 
 from grader.line_slips.python_habits import (
@@ -149,7 +149,8 @@ def corrections(line: str, message: str = "", column: int | None = None) -> Iter
     if meant := _keyword(code):
         code = re.sub(r"^(\s*)\w+", rf"\g<1>{meant[1]}", code)
         yield _together(code, comment, texts)
-    yield from (one for _, one in without_doubled(line) if not _parses(line))
+    doubled = [one for _, one in without_doubled(line) if not _parses(line)]
+    yield from doubled if "unmatched" not in message else ()
     yield from (_together(one, comment, texts) for _, _, one in _with_keyword(code) if not _parses(line))
     plain = code.rstrip(" ;")
     yield _together(plain, comment, texts)
@@ -157,7 +158,65 @@ def corrections(line: str, message: str = "", column: int | None = None) -> Iter
         yield _together(f"{plain}:", comment, texts)
     yield from (_together(one, comment, texts) for one in _with_separator(plain, texts))
     yield from _with_bracket(line, message, column)
+    yield from doubled
     yield from _with_quote(line, message, column)
+
+
+def with_known_words(line: str, own: Sequence[str], known: Collection[str]) -> list[str]:
+    """Return the line's corrections. Where the first of its `own` that is good Python has a word that is not `known`,
+    the line with two neighbours exchanged comes before them, or with a sign more or less by which a word becomes a
+    known one."""
+    least = next((len(unknown_words(one, known)) for one in own if _parses(one)), len(line))
+    if len(line) > EDITED_CHARS_MAX:
+        return [*own]
+    said, strange, texts = set(_words(line)), unknown_words(line, known), _taken_apart(line)[2]
+    near: dict[str, int] = {}
+    for one in _turned(line):
+        left = len(unknown_words(one, known))
+        is_plain = _taken_apart(one)[2] == texts
+        # a sign or a letter that slipped behind a quote: `'talker)'`, `d'ata'`
+        is_moved = len(_OUTSIDE.findall(without_texts(one))) > len(_OUTSIDE.findall(without_texts(line)))
+        is_better = left < len(strange) or is_moved or (is_plain and set(_words(one)) == said)
+        if is_better and left <= least and (least or is_moved) and _parses(one):
+            near[one] = left
+    for one in _one_sign_off(line) if least else ():
+        unknown, words = unknown_words(one, known), set(_words(one))
+        gained = any(len(word) > 1 for word in words - said - unknown)
+        is_better = len(unknown) < len(strange) or (gained and len(unknown) == len(strange))
+        if is_better and len(unknown) < least + gained and _parses(one):
+            near.setdefault(one, len(unknown))
+    return [*sorted(near, key=lambda one: near[one])[:EDITS_MAX], *own]
+
+
+def unknown_words(line: str, known: Collection[str]) -> set[str]:
+    """Return the words of a line's code that are not among those."""
+    return {word for word in _words(line) if word not in known}
+
+
+def _words(line: str) -> list[str]:
+    return _WORD.findall(without_texts(line))
+
+
+def _turned(line: str) -> Iterator[str]:
+    """Yield the line with two neighbours exchanged, of which one at least is no letter."""
+    for at in range(len(line) - len(line.lstrip()), len(line) - 1):
+        if not line[at : at + 2].isalnum():
+            yield line[:at] + line[at + 1] + line[at] + line[at + 2 :]
+
+
+def _one_sign_off(line: str) -> Iterator[str]:
+    """Yield the line with a sign less, and with a sign more."""
+    begin = len(line) - len(line.lstrip())
+    yield from (line[:at] + line[at + 1 :] for at in range(begin, len(line)) if line[at] in _LEFT_OUT)
+    yield from (line[:at] + sign + line[at:] for sign in _SIGNS for at in range(begin + 1, len(line) + 1))
+
+
+_SIGNS = " ()[].,:="
+_OUTSIDE = re.compile(r"[(),:]")
+_LEFT_OUT = " ()[],:="
+_WORD = re.compile(r"[^\W\d]\w*")
+EDITED_CHARS_MAX = 120
+EDITS_MAX = 5
 
 
 def from_html(line: str) -> str:
@@ -274,18 +333,20 @@ def _with_bracket(line: str, message: str, column: int | None) -> Iterator[str]:
     if shorter := _without_unmatched(line, message, column):
         code, comment, texts = _taken_apart(line)
         asked = _ASKED.sub(r"\1()", code, count=1)
-        called = re.sub(r"((?:^|[\s(=%])(?:\w+\.)+[a-z_]+)\)$", r"\1()", code)
+        called = re.sub(r"((?:^|[\s(=%])(?:\w+\.)+[a-z_]+|^\s*\w+)\)$", r"\1()", code)
         called = re.sub(
             r"^(\s*def\s+(?:\w*(?:callback|cb|handler)(?=msg|data|message|req))?\w*?)((?:(?<=callback)|(?<=cb)|(?<=handler))(?:msg|data|message|req)|)\):$",
             r"\1(\2):",
             called,
         )
-        called = re.sub(r"(^|[\s(=])([A-Z]\w*)\)\.", r"\1\2().", called)
+        called = re.sub(r"(^|[\s(=])([A-Z]\w*)\)(?=\.|$)", r"\1\2()", called)
         if _METHOD.match(code):
             called = re.sub(r"^(\s+def\s+\w+?)(self(?:,\s*\w+)*)\):$", r"\1(\2):", code)
         filled = _GLUED.sub(r"\1(\2)", code)
         opened = _OPENED.sub(lambda found: f"{_log_call(found[1])}(", code, count=1)
-        yield from (_together(one, comment, texts) for one in (asked, filled, opened, called) if one != code)
+        shifted = re.sub(r"(?<=\w)\)\)", "()", code, count=1)
+        likely = (shifted if _parses(shifted) else code, asked, filled, opened, called)
+        yield from (_together(one, comment, texts) for one in likely if one != code)
         yield shorter
     wrong = re.search(r"'(.)' does not match opening parenthesis '(.)'", message)
     opener = line.rfind(wrong[2], 0, at) if wrong and wrong[2] in "{[" else 0

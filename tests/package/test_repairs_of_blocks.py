@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 from pathlib import Path
 
 import pytest
@@ -205,3 +206,79 @@ def test_what_an_if_that_is_missing_asked_is_not_known(alone: str) -> None:
     wrong = SCRIPT.replace("        rate.sleep()", f"            {alone}\n        rate.sleep()")
     assert not list(make_readable(wrong))
     assert list(make_readable(wrong.replace(alone, "print(1)")))
+
+
+NODE = """\
+#!/usr/bin/env python3
+import rospy
+from std_msgs.msg import Int8, String
+
+
+def heard(text):
+    rospy.loginfo('I heard %s', text.data)
+
+
+def on_number(number):
+    if number.data > 0:
+        rospy.loginfo('number %d', number.data)
+    rospy.logdebug('heard')
+
+
+def talk():
+    pub = rospy.Publisher('chatter', String, queue_size=10)
+    rospy.init_node('talker', anonymous=True)
+    rospy.Subscriber('text', String, heard)
+    rospy.Subscriber('number', Int8, on_number)
+    rate = rospy.Rate(10)
+    while not rospy.is_shutdown():
+        now = rospy.get_time()
+        pub.publish('hello %s' % now)
+        rate.sleep()
+
+
+if __name__ == '__main__':
+    try:
+        talk()
+    except rospy.ROSInterruptException:
+        pass
+"""
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong"),
+    [
+        ("def on_number(", "    def on_number("),
+        ("def talk(", "    def talk("),
+        ("    if number.data", "    # if number.data"),
+        ("def heard(text):\n", ""),
+        ("    while not rospy.is_shutdown():\n", ""),
+        ("    rate = rospy.Rate(10)\n    while not rospy.is_shutdown():\n",
+         "    while not rospy.is_shutdown():\n    rate = rospy.Rate(10)\n"),
+        ("    pub = ", "        pub = "),
+        ("        now = ", "            now = "),
+        ("        talk()\n", ""),
+        ("def talk():\n    pub", "    def talk():\n    pub"),
+        ("import rospy\n", " rospy\n"),
+        ("from std_msgs.msg import", " std_msgs.msg import"),
+        ("def talk(", "de ftalk("),
+        ("heard)", "hear)d"),
+        ("String, heard", "Strin,g heard"),
+        ("'chatter'", "c'hatter'"),
+        ("__main__':", "__main__:'"),
+        ("'talker', anon", "'talker, anon"),
+        ("pub.publish('", "pub.publish'("),
+        ("rospy.get_time()", "rospy.get_time))"),
+        ("Rate(10)", "Rate10)"),
+    ],
+)  # fmt: skip
+def test_one_slip_in_a_node_is_undone(right: str, wrong: str) -> None:
+    """What comes out is the node as it was, and no other program that only parses."""
+    steps = make_readable(NODE.replace(right, wrong, 1))
+    assert ast.dump(ast.parse(steps[-1]["text"])) == ast.dump(ast.parse(NODE))
+
+
+def test_a_function_without_a_body_is_left_without_one() -> None:
+    """What belongs below `def` is not known, and nothing else of the script is moved there."""
+    before = NODE.replace("    rospy.loginfo('I heard %s', text.data)\n", "")
+    (step,) = make_readable(before)
+    assert step["text"] == before.replace("def heard(text):\n", "def heard(text):\n    pass\n")

@@ -19,6 +19,7 @@ from pathlib import PurePosixPath
 from typing import Any
 
 from grader.package.lint.script_names import never_main
+from grader.package.python_repairs.blocks import syntax_error
 from grader.package.python_repairs.calls import (
     with_arguments,
     with_callbacks,
@@ -69,7 +70,6 @@ from grader.package.python_repairs.syntax import (
     nodes_in,
     span_of,
     step_to,
-    syntax_error,
     tree_of,
 )
 from grader.wording import is_one_edit

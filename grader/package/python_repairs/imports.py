@@ -13,6 +13,7 @@ from collections.abc import Collection, Iterator
 from difflib import get_close_matches
 
 from grader.installable import MODULE_OF
+from grader.package.python_repairs.blocks import with_line
 from grader.package.python_repairs.names import bound_in, meant_by
 from grader.package.python_repairs.syntax import (
     Step,
@@ -23,7 +24,6 @@ from grader.package.python_repairs.syntax import (
     span_of,
     step_to,
     tree_of,
-    with_line,
 )
 from grader.wording import is_one_edit, join_words
 

@@ -83,8 +83,10 @@ def lost_head(text: str, tree: ast.Module, body: Sequence[ast.stmt]) -> str:
         return ""
     if of_class:
         return f"class {lost[0]}:"
-    nodes = (n for one in body for n in ast.walk(one) if isinstance(n, ast.Attribute) and n.attr == "data")
-    value = next((n.value.id for n in nodes if isinstance(n.value, ast.Name)), "")
+    nodes = [n for one in body for n in ast.walk(one) if isinstance(n, ast.Attribute)]
+    given = {*given_names(tree, names), *dir(builtins)}
+    values = [n.value.id for n in nodes if isinstance(n.value, ast.Name) and n.value.id not in given]
+    value = values[0] if values else ""
     return f"def {lost[0]}({value if value and named[lost[0]] else named[lost[0]]}):"
 
 

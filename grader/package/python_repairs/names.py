@@ -18,6 +18,7 @@ from string import digits
 
 from grader.package.lint.script_names import is_value, meant_at_most
 from grader.package.lint.script_results import misnamed_targets
+from grader.package.python_repairs.blocks import with_line
 from grader.package.python_repairs.syntax import (
     Step,
     edited,
@@ -26,7 +27,6 @@ from grader.package.python_repairs.syntax import (
     span_of,
     step_to,
     tree_of,
-    with_line,
 )
 from grader.wording import AT_THE_END, is_one_edit, plural
 
