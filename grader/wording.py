@@ -225,6 +225,23 @@ def convert(function: str, value: str) -> str:
     return f"write `{function}({value})` instead of `{value}`"
 
 
+WRITE_HANDLER = re.compile(r"on line (\d+)(?: of [\w./-]+)?, write `(except rospy\.ROSInterruptException:)`")
+"""The line and its code in the fix of an `except` that drops every error, which `package/lint` writes."""
+
+
+IN_PLACE_OF_SPIN = re.compile(r"on line (\d+), write `([\w.]+\.sleep\([\d.]*\))` in place of spin\(\)")
+"""The line and the call in the fix of a `spin()` in a loop, which `package/lint` writes."""
+
+
+HIDING = re.compile(r"give ([\w./-]+\.py) another name, everywhere it is named")
+"""The file in a hint of `rename_hiding`."""
+
+
+def rename_hiding(file: str) -> str:
+    """Return the hint on a file that has the name of a module which its neighbours import."""
+    return f"give {file} another name, everywhere it is named"
+
+
 ASKED_RATE = re.compile(r"make it \S+ Hz in ([^:;]+\.py), line (\d+): use ([\w.]+\([\d.]+\))")
 """The file, the line and the call in a hint of `ask_rate`."""
 ASKED_TYPE = re.compile(r"use (\w+)/(\w+), the type that the handout asks for")

@@ -42,6 +42,7 @@ from grader.checks.support.topics import (
 )
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
+from grader.model.python_slip import SlipKind
 from grader.model.verdict import Status, Verdict, failed, failed_or_blocked, grade_again, inconclusive, passed
 from grader.wording import NOTHING_TO_DO, plural, seconds, significant
 
@@ -236,7 +237,9 @@ def counter_wrap(package: PackageFacts, run: Run, params: WrapParams) -> Verdict
     if early is not None and verdict.status.is_lost and seen and seen.after == low + 1:
         verdict = cite_early(verdict, early)
     else:
-        verdict = cite_slip(verdict, count, run, package, "compared", "reset-early")
+        verdict = cite_slip(verdict, count, run, package, "counter-type", "compared", "reset-early")
+    if seen and seen.before < high - 1:
+        verdict = _with_left_out(verdict, count, run, package, params.topic)
     verdict = verdict if verdict.status is Status.PASS else _of_clock(verdict, count, run, package, params)
     turn = f"{significant(seen.before)}→{significant(seen.after)}" if seen else "no reset"
     lowest, highest = significant(min(count.values)), significant(max(count.values))
@@ -308,14 +311,22 @@ def _of_clock(
     return failed(message + seen, hint=hint, citations=(slip.place,))
 
 
+def _with_left_out(verdict: Verdict, count: Count, run: Run, package: PackageFacts, topic: str) -> Verdict:
+    """Return the verdict with the `if` that leaves out values on the topic."""
+    left_out = slips_of(package, run, count.callerid, "published-in-part")
+    is_topics = any(is_written_as(one.name, topic) for one in left_out)
+    return cite_slip(verdict, count, run, package, "published-in-part") if is_topics else verdict
+
+
 def _with_lines(
     verdict: Verdict, count: Count, wrong: Sequence[Step], run: Run, package: PackageFacts, *, topic: str
 ) -> Verdict:
     """Return the verdict with the lines of the script that make the steps wrong."""
-    left_out = slips_of(package, run, count.callerid, "published-in-part")
-    if wrong and any(is_written_as(one.name, topic) for one in left_out):
-        verdict = cite_slip(verdict, count, run, package, "published-in-part")
-    verdict = cite_slip(verdict, count, run, package, "no-effect", "set-in-loop")
+    if wrong:
+        verdict = _with_left_out(verdict, count, run, package, topic)
+    texts = [s for s in slips_of(package, run, count.callerid, "counter-type") if s.name == "text"]
+    kinds: tuple[SlipKind, ...] = ("counter-type",) if texts else ("no-effect", "set-in-loop")
+    verdict = cite_slip(verdict, count, run, package, *kinds)
     flags = [s for s in slips_of(package, run, count.callerid, "wrong-value") if s.name == "stuck"]
     if flags and any(step.change == 0 for step in wrong) and verdict.status.is_lost:
         why = f"{flags[0].file}, line {flags[0].line}: {flags[0].message}"

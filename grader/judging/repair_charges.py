@@ -431,7 +431,9 @@ def is_next_fault(one: Verdict, copy: Verdict, repairs: Sequence[Repair]) -> boo
     unread = any(_names_new(repair, one.hint) and not _names_new(repair, copy.hint) for repair in repairs)
     in_repaired = found != set() or one.basis.unjudged or unread
     in_repaired = in_repaired or any(is_told(repair, one.hint) for repair in repairs)
-    shown = not copy.basis.unjudged or (one.basis.unjudged and found != set())
+    # an exception at a known line of what was repaired is seen, whatever it keeps from being judged
+    raised = one.basis.unjudged or copy.basis.charged_once
+    shown = not copy.basis.unjudged or (raised and found != set())
     return in_repaired and shown and not found & again and _is_other_fault(one, copy)
 
 

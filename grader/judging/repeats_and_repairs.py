@@ -25,7 +25,7 @@ from grader.evidence.events import CATKIN_MAKE, PACKAGE_RUN
 from grader.evidence.run import Run
 from grader.judging import repair_charges
 from grader.model.package import PackageFacts
-from grader.model.repair import OF_LOGIC, Repair
+from grader.model.repair import OF_LOGIC, RENAMED, Repair
 from grader.model.result import CriterionResult, Repaired
 from grader.model.verdict import FileCitation, Status, Verdict, cited_lines
 from grader.rubric.model import Criterion, Rubric
@@ -370,7 +370,8 @@ def is_used_by(
         return made or not built or any(start.built for start in scenario.start)
     if repair.kind == "package-name" and repair.file in repair_charges.OF_PACKAGES:
         return True
-    if both & _started_files(scenario):
+    # what hides a module is imported by every script beside it
+    if both & _started_files(scenario) or name == f"{RENAMED}{PurePosixPath(repair.before).name}":
         return True
     if name.endswith((".launch", ".launch.xml")):
         included = any({ANY, name} & {*launched.get(one, {ANY})} for one in _started_files(scenario))

@@ -20,7 +20,7 @@ SlipKind = Literal[
     "printed-in-part", "published-in-part", "never-published", "takes-number", "typed-text", "goes-on",
     "no-argument", "read-late", "debugger", "drops-result", "returns-list", "fills", "catches", "no-result",
     "stuck", "runs-out", "base-unmade", "rate-as-time", "frames", "changes-copy", "step-number", "keeps-rate",
-    "way-number", "read-to-set",
+    "way-number", "read-to-set", "swallows", "counter-type",
 ]  # fmt: skip
 
 
@@ -81,6 +81,7 @@ class PythonSlip(Placed, Record):
     - `not-started`: an action server that waits for a `start()` that no line calls.
     - `queue-size`: a queue size that is a text, with which rospy sends nothing.
     - `set-in-loop`, `reset-early`: a counter that is set in each turn of its loop, or goes back before one is added.
+    - `counter-type`: a counter that is a text, or numpy's `int8` (`name`: `text`, `int8`).
     - `no-clock`: the file publishes and counts, and nothing that it sends contains the time, except at most the value
       from which it counts on; a slip only if its messages have to contain the time.
     - `clock-value`: the values of the topic `message` are read from a clock, or made up at random (`name`: `random`),
@@ -149,6 +150,8 @@ class PythonSlip(Placed, Record):
     - `catches`: which errors the `except`s of a `try` catch, where its last one stands; `name` has the first and the
       last line of the `try`'s block, `fix` the name that the `except` gives the error.
     - `no-result`: where an action's goal is ended by the call `name` without a result.
+    - `swallows`: an `except` of every error that does nothing, or prints what is always the same: a slip only if the
+      script does not do what it should.
     - `unused-import`, `lacking-import`: an import of the module `message` whose names nothing in the script uses, or
       that Python did not find where the files were read (`fix`: the name of a module in it, as `lab_msgs.msg`).
     """

@@ -67,6 +67,10 @@ MOVING: frozenset[RepairKind] = frozenset({"file-name", "exchanged-files"})
 """Kinds whose `before` and `after` are paths."""
 
 
+RENAMED = "my_"
+"""What a file's name begins with once it no longer hides a module."""
+
+
 ASKED = "put a value in the code in place of `raw_input(…)`: a node cannot ask for input"
 TYPED = "write `input` in place of `raw_input`"
 """The fix of a `raw_input(…)` to which the grader types the answer."""

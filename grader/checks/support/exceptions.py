@@ -349,11 +349,11 @@ def _call(message: str, source: str, marked: tuple[int, int] | None) -> Meaning 
     given = _ONE_TOO_MANY.search(message)
     if given and int(given[3]) == int(given[2]) + 1 and f".{given[1]}(" in source:
         method = given[1]
+        if f"rospy.{method}(" in source:
+            return f"`{method}` is given a value, and rospy's takes none", f"write `rospy.{method}()`"
         taken = "self, …" if int(given[2]) else "self"
-        return (
-            f"`{method}` is a method, so its first parameter has to be `self`",
-            f"make it `def {method}({taken}):`",
-        )
+        why = f"`{method}` is a method, so its first parameter has to be `self`"
+        return why, f"make it `def {method}({taken}):`"
     if (lacks := _TOO_FEW.match(message)) and re.search(rf"\b{lacks[1]}\(", source):
         name, values = lacks.groups()
         hint = f"put {values} into its brackets"

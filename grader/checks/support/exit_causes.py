@@ -196,7 +196,9 @@ def _find_cause(life: Life, run: Run, package: PackageFacts) -> Ending:
     given = [one for one in life.start.argv[1:] if ":=" not in one]
     explained = explain_arguments(last, given)
     words, hint = (f"{words}; {explained[0]}", explained[1]) if explained else (words, RUN_IT)
-    return Ending(f"it exited with code {code}{words}", hint)
+    own = [s for s in package.slips if (s.file, s.kind) == (life.start.script, "ends-node")]
+    words, hint, cited = (f": {own[0].message}", own[0].fix, (own[0].place,)) if own else (words, hint, ())
+    return Ending(f"it exited with code {code}{words}", hint, cited)
 
 
 def explain_code(code: int, printed: Sequence[str], *, shown_by_roslaunch: bool) -> tuple[str, str]:
@@ -240,7 +242,7 @@ def _not_run(life: Life, run: Run, package: PackageFacts) -> Ending | None:
         cited = (FileCitation(file=script.path, line=1),)
         return Ending("its file is empty", f"write the node in {script.path}", cited, by_itself=True)
     calls = ("main-guard", "not-called", "never-called")
-    kinds = (*calls, "never-begun", "loop-left", "commented-out", "no-init", "ends-node")
+    kinds = (*calls, "never-begun", "loop-left", "commented-out", "no-init", "ends-node", "swallows")
     own = [s for s in package.slips if s.file == life.start.script and s.kind in kinds]
     slips = [
         s

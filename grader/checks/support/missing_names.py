@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import posixpath
 import re
+import sys
 from collections.abc import Collection, Iterable, Mapping
 from contextlib import suppress
 from pathlib import PurePosixPath
@@ -34,7 +35,7 @@ from grader.installable import (
 from grader.line_slips.python import parsed
 from grader.model.package import CMAKE, Interface, PackageFacts
 from grader.model.python_slip import PythonSlip
-from grader.wording import closest, join_words
+from grader.wording import closest, join_words, rename_hiding
 
 SETUP_PAGE = "http://docs.ros.org/en/noetic/api/catkin/html/howto/format2/installing_python.html"
 IMPORT_ERRORS = ("ImportError", "ModuleNotFoundError")
@@ -46,7 +47,10 @@ _IN_MODULE = re.compile(r"No module named '(\w+\.(?:msg|srv))\.(\w+)'")
 _KEYWORD = re.compile(r"got an unexpected keyword argument '(\w+)'")
 NO_MODULE = re.compile(r"No module named '(\w+)'$")
 _OF_MESSAGES = re.compile(r"No module named '(\w+)\.(\w+)'(?:$|; '\1' is not a package)")
-_HIDDEN = re.compile(r"'(\w+)\.(?!py')[\w.]+'; '\1' is not a package|partially initialized module '(\w+)'")
+_HIDDEN = re.compile(
+    r"(?:No module named|partially initialized module|^module|cannot import name '\w+' from)"
+    r" '(\w+)(?:\.(?!py')[\w.]+)?'"
+)
 KEYWORDS = (
     "anonymous", "log_level", "disable_signals", "argv", "queue_size", "latch", "tcp_nodelay", "headers", "callback",
     "callback_args", "buff_size", "subscriber_listener", "data_class", "oneshot", "timeout", "default",
@@ -129,16 +133,17 @@ def _other_argument(name: str, *, of_node: bool) -> tuple[str, str]:
 def hiding_file(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
     """Return the cause and the hint where a file beside the script has the name of the module that is imported."""
     wanted = _HIDDEN.search(found.message)
-    script = path_in_package(package, found.innermost.file)
+    script = path_in_package(package, found.own_frames[0].file) if found.own_frames else None
     if wanted is None or script is None:
         return None
-    name = wanted[1] or wanted[2]
+    name = wanted[1]
     path = PurePosixPath(script).with_name(f"{name}.py")
-    if package.file(str(path)) is None:
+    known = {package.name, "rospy", *noetic_messages(), *known_packages(), *sys.stdlib_module_names}
+    if package.file(str(path)) is None or name not in known:
         return None
     what = f"the package {name}" if name in {package.name, *noetic_messages()} else f"the module {name}"
     cause = f"Python finds {path} where {what} is meant, because it looks beside the script first"
-    return cause, f"give {path} another name, everywhere it is named"
+    return cause, rename_hiding(str(path))
 
 
 def own_message(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:

@@ -270,7 +270,7 @@ def _judge_advertised(
         return _commented_out(message, slip, of_node)
     # A node that hears something may have good reason to publish on a condition only.
     kinds: tuple[SlipKind, ...] = ("never-published", *(() if _heard_topics(run) else ("published-in-part",)))
-    never = run_slips(package, run, "never-begun")
+    never = run_slips(package, run, "never-begun") or run_slips(package, run, "swallows")
     if (
         told := _unused_publisher(package, run, topic, kinds)
         or reads_keys(package, run)

@@ -97,7 +97,7 @@ def lacks_body(head, line):
     return bool(of_if and width_of(head) == width_of(line) and PAUSES.match(line))
 
 
-def first_version(text):
+def first_version(text, left_out="|="):
     """Return the text with empty lines in place of git's merge markers and of all versions but the first. The others
     stand behind `=======` and, for the one that both come from, behind `|||||||`."""
     kept, part = [], ""
@@ -106,6 +106,11 @@ def first_version(text):
         # A line of `=======` alone is no marker: only `<<<<<<<` begins one of git's conflicts.
         part = line[0] if marker and (part or line[0] == "<") else part
         # Each line stays, be it empty, so that those below it keep their numbers.
-        kept.append("" if part and (marker or part in "|=") else line)
+        kept.append("" if part and (marker or part in left_out) else line)
         part = "" if part == ">" else part
     return "\n".join(kept)
+
+
+def last_version(text):
+    """Return the text with empty lines in place of git's merge markers and of all versions but the last."""
+    return first_version(text, "<|")

@@ -32,6 +32,8 @@ CLOCKS = {
     "get_param", "get_param_cached", "Subscriber", "Timer", "vars", "globals", "__dict__", "modules",
 }  # fmt: skip
 """Names by which a script may come to know the time, or something that it cannot be seen to be."""
+READINGS = ("get_time", "get_rostime", "now", "time")
+"""Calls that read a clock."""
 PLAIN_MODULES = {
     "__future__", "itertools", "math", "numpy", "os", "random", "roslib", "rospy", "signal", "string",
     "sys", "threading", "time",
@@ -137,7 +139,11 @@ def values_left_out(tree):
             inside = set(ast.walk(one))
             counted = {dotted(t) for n in ast.walk(loop) if n not in inside for t in increments(n)}
             outside = {ast.dump(n.func) for n in calls_in(loop, "publish") if n not in chain}
-            if not (names_in(one.test) & counted if counted else not calls_in(one.test, "is_shutdown")):
+            by_clock = any(called_name(n) in READINGS for n in ast.walk(one.test))
+            asks = by_clock or (
+                names_in(one.test) & counted if counted else not calls_in(one.test, "is_shutdown")
+            )
+            if not asks:
                 continue
             sent = {}
             for call in chain:
@@ -226,6 +232,63 @@ def published_unchanged(tree):
             message = "each pass through the loop on line %d publishes `%s`" % (loop.lineno, name)
             message += ", which only line %d makes, above it" % line
             yield slip(call.lineno, "no-effect", message, fix, name)
+
+
+def times_of_above(tree):
+    """Loops that publish, in each turn, a text with a time in it which only a line above them read."""
+    changed = {}
+    for n in all_of(tree, ast.Assign, ast.AugAssign, ast.For):
+        for target in getattr(n, "targets", None) or [n.target]:
+            changed.setdefault(dotted(target), []).append(n)
+    readings = {name: of[0].value for name, of in changed.items() if len(of) == 1 and reads_clock(of[0])}
+    for loop in (n for n in all_of(tree, ast.While) if calls_in(n, "publish")):
+        inside = set(ast.walk(loop))
+        texts = [
+            n for n in inside if isinstance(n, (ast.expr)) and is_text(n) and not isinstance(n, ast.Constant)
+        ]
+        told = {
+            id(n) for call in inside if called_name(call).startswith(("log", "print")) for n in ast.walk(call)
+        }
+        sent = [n for one in texts if id(one) not in told for n in ast.walk(one)]
+        names = [n for n in sent if dotted(n) in readings and readings[dotted(n)].lineno < loop.lineno]
+        differences = {id(n) for b in inside if isinstance(b, ast.BinOp) and is_sum(b) for n in ast.walk(b)}
+        # a time since then grows, too
+        names = [n for n in names if id(n) not in differences and n.lineno >= loop.lineno]
+        again = any(called_name(n) in READINGS for n in sent)
+        if not names or again:
+            continue
+        first = min(names, key=lambda n: n.lineno)
+        name = dotted(first)
+        fresh = [
+            one
+            for one in readings
+            if readings[one] in inside and ast.dump(readings[one]) == ast.dump(readings[name])
+        ]
+        right = fresh[0] if len(fresh) == 1 else "%s()" % dotted(readings[name].func)
+        message = "each pass through the loop on line %d publishes `%s`, which only line %d reads, above it"
+        message %= (loop.lineno, name, readings[name].lineno)
+        yield slip(
+            first.lineno,
+            "no-effect",
+            message,
+            "on line %d, write `%s` in place of `%s`" % (first.lineno, right, name),
+            name,
+        )
+
+
+def is_sum(node):
+    return isinstance(node.op, (ast.Add, ast.Sub)) and not is_text(node)
+
+
+def reads_clock(node):
+    """Whether a statement gives a name what a clock reads then, and nothing else."""
+    value = getattr(node, "value", None) if isinstance(node, ast.Assign) and len(node.targets) == 1 else None
+    return (
+        isinstance(value, ast.Call)
+        and called_name(value) in READINGS
+        and not value.args
+        and "..." not in dotted(value.func)
+    )
 
 
 def alike_made(one, other):

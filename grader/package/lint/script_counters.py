@@ -16,6 +16,7 @@ from script_tree import (
     calls_in,
     dotted,
     lines_from,
+    listed,
     loop_around,
     names_in,
     slip,
@@ -235,6 +236,44 @@ def counter_starts(tree):
     sent = set(map(called_name, made)) - {""}
     for function in (f for f in all_of(tree, ast.FunctionDef) if f.name in sent):
         yield from added_before_return(function)
+
+
+def counter_types(tree):
+    """Counters that do not count as numbers do: a text that is made longer, `"1" + "1"`, and numpy's `int8`, which
+    goes on with -128 after 127."""
+    texts, bytes_ = {}, {}
+    for node in (n for n in all_of(tree, ast.Assign) if len(n.targets) == 1):
+        found = texts if is_digits(node.value) else bytes_ if called_name(node.value) == "int8" else {}
+        found.setdefault(dotted(node.targets[0]), []).append(node)
+    for node in all_of(tree, ast.Assign, ast.AugAssign):
+        name = dotted(getattr(node, "target", None) or node.targets[0])
+        begun, added = texts.get(name) or bytes_.get(name), added_value(node, name)
+        if not begun or added is None:
+            continue
+        told = "on %s, write `%s = 0`" % (listed([n.lineno for n in begun]), name)
+        told += ", and on line %d, write `%%s`" % node.lineno
+        if name in texts and (called_name(added) == "str" or is_digits(added)):
+            message = "`%s` is a text, which line %d makes longer: '1' and '1' is '11'" % (name, node.lineno)
+            fix = told % ("%s = %s + 1" % (name, name))
+            yield slip(node.lineno, "counter-type", message, fix, "text")
+        elif name in bytes_:
+            message = "`%s` is an int8 of numpy, of which 127 and 1 is -128" % name
+            fix = told % ("%s = (%s + 1) %% 128" % (name, name))
+            yield slip(begun[0].lineno, "counter-type", message, fix, "int8")
+
+
+def is_digits(node):
+    value = getattr(node, "value", None) if isinstance(node, ast.Constant) else None
+    return isinstance(value, str) and value.isdigit()
+
+
+def added_value(node, name):
+    """Return what a statement adds to a variable; None where it does not."""
+    if isinstance(node, ast.AugAssign):
+        return node.value if isinstance(node.op, ast.Add) else None
+    value = node.value
+    adds = isinstance(value, ast.BinOp) and isinstance(value.op, ast.Add) and dotted(value.left) == name
+    return value.right if adds else None
 
 
 def given_numbers(node, counted):

@@ -163,6 +163,14 @@ def rates_for_times(tree):
         yield slip(node.lineno, "rate-as-time", message, "on line %d, write %s" % (node.lineno, right))
 
 
+def sleeps_of_turns(tree):
+    """Yield each `sleep(…)` that a function does whenever a loop calls it."""
+    functions = functions_in(tree)
+    called = {called_name(n) for loop in all_of(tree, ast.While) for n in all_of(loop, ast.Call)}
+    for own in (functions[name] for name in called if name in functions):
+        yield from (n.value for n in own.body if isinstance(n, ast.Expr) and is_call(n.value, "sleep"))
+
+
 def loop_rates(tree):
     """Rates of loops and timers: a parameter that is read there, its name as written; or a number, in Hz as text.
 
@@ -170,6 +178,7 @@ def loop_rates(tree):
     """
     bound = values_given(tree)
     looped = {id(one) for loop in all_of(tree, *LOOPS) for one in calls_in(loop, "sleep")}
+    looped |= {id(one) for one in sleeps_of_turns(tree)}
 
     def given(node):
         for _ in range(STEPS_LIMIT):

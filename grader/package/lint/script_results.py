@@ -374,3 +374,30 @@ def swallowed_exceptions(tree):
             message = "`__exit__` returns True, so that an exception that is raised in its `with` is dropped"
             fix = "on line %d, write `return False`: then it goes on to where it is expected" % last.lineno
             yield slip(last.lineno, "wrong-value", message, fix, "swallowed")
+
+
+HELD_UP = {"sleep", "spin", "is_shutdown"}
+
+
+def dropped_errors(tree):
+    """An `except` of every error, around what calls something, that says nothing of the error and goes on."""
+    for one in all_of(tree, ast.Try):
+        calls = {called_name(n) for part in one.body for n in ast.walk(part) if isinstance(n, ast.Call)}
+        for handler in one.handlers:
+            if calls - HELD_UP and dotted(handler.type).rpartition(".")[2] in BROAD and says_nothing(handler):
+                message = "line %d drops every error, and says nothing of it" % handler.lineno
+                fix = "on line %d, write `except rospy.ROSInterruptException:`" % handler.lineno
+                yield slip(handler.lineno, "swallows", message, fix)
+
+
+def says_nothing(handler):
+    """Whether an `except` does nothing but to print a text that is always the same."""
+    done = [n for n in handler.body if not isinstance(n, (ast.Pass, ast.Continue))]
+    told = [n.value for n in done if isinstance(n, ast.Expr)]
+    plain = [n for n in told if isinstance(n, ast.Constant) or tells_nothing(n)]
+    return len(plain) == len(done)
+
+
+def tells_nothing(node):
+    is_print = called_name(node) == "print" or called_name(node).startswith("log")
+    return is_print and all(isinstance(one, ast.Constant) for one in node.args)

@@ -105,7 +105,7 @@ def sleeps_in_if(loop):
             fix = "below line %d, write `%s()` too" % (last.end_lineno, name)
             yield slip(own[0].lineno, "sleep-outside", message, fix, name)
         own = [n for n in within if isinstance(n, ast.Expr) and is_call(n.value, "sleep")]
-        if plain and len(sleeps) == len(own) == 1 and own[0] is within[-1] and one is loop.body[-1]:
+        if plain and len(sleeps) == len(own) == 1 and own[0] is within[-1]:
             name, line = dotted(own[0].value.func), own[0].lineno
             message = "`%s()` is inside the `if` on line %d" % (name, one.lineno)
             fix = "write line %d with the same spaces or tabs before it as line %d has" % (line, one.lineno)

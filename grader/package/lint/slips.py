@@ -75,13 +75,14 @@ def slips(tree, numbers=()):
         sleeps.sleepless_loops, sleeps.sleeps_twice, loops.publishes_twice, callbacks.callbacks,
         callbacks.waiting_callbacks, objects.queue_sizes, graph_names,
         objects.object_slips, said_texts, loops.deaf_loops, clocks.clock_values, counters.counter_slips,
-        counters.counter_starts, without_effect, values.assigned_late, objects.hidden_names, objects.subscribed_again,
-        imports, objects.taken_off, objects.unstarted_servers, values.wrong_values, values.decided_conditions,
+        counters.counter_types, counters.counter_starts, without_effect, values.assigned_late, objects.hidden_names,
+        objects.subscribed_again, imports, objects.taken_off, objects.unstarted_servers,
+        values.wrong_values, values.decided_conditions,
         values.times_added_again, values.params_read_unset, values.defaults_first, values.overwritten_values,
         values.published_in_turn, values.letters_of_keys,
         arithmetic.arithmetic_slips, scans.scan_slips, values.flagged_loops,
         values.kept_velocities, values.values_never_set_back, values.emptied_files,
-        script_prints.unprinted_messages, clocks.values_left_out, clocks.published_unchanged,
+        script_prints.unprinted_messages, clocks.values_left_out, clocks.published_unchanged, clocks.times_of_above,
         unsent.unused_publishers, unsent.unsent_messages, unsent.changed_copies, unsent.lost_objects,
         unsent.read_to_set, rates.loops_of_numbers,
         goals.finished_goals, goals.finished_in_loops, goals.ended_without_result, clocks.sends_no_time, without_node,
@@ -90,7 +91,7 @@ def slips(tree, numbers=()):
         calls.arguments_out_of_order, calls.bare_decorators, scans.first_scans,
         sides.named_sides, sides.numbers_of_way, sides.overlapping_sides, sides.frames_swapped, sides.frames_named,
         grids.rows_of_grids, script_results.unreturned_answers, goals.never_cancelled,
-        script_results.swallowed_exceptions, callbacks.closed_before,
+        script_results.swallowed_exceptions, script_results.dropped_errors, callbacks.closed_before,
     )  # fmt: skip
     as_written = {find: list(find(tree)) for find in OF_NAMES}
     own_words = spell_rospy_out(tree)

@@ -290,6 +290,18 @@ def _wrong_arguments(tree: ast.Module, kinds: list[str]) -> Iterator[Argument]:
             yield from _without_callback(call, tree) if name == "Subscriber" else ()
             yield from _subscribed(call, name, functions | methods)
             yield from _without_quotes(call, name, functions)
+            yield from _given_too_much(call, name)
+
+
+TAKE_NOTHING = frozenset({"spin", "is_shutdown", "get_time", "get_rostime", "get_name", "get_namespace"})
+"""Functions of rospy, some of which take the node in ROS 2."""
+
+
+def _given_too_much(call: ast.Call, name: str) -> Iterator[Argument]:
+    """Of `rospy.spin(node)`, as in ROS 2."""
+    if name in TAKE_NOTHING and (call.args or call.keywords):
+        why = f"`{name}` is given a value, and rospy's takes none"
+        yield Argument([(call, f"{ast.unparse(call.func)}()")], why)
 
 
 def _in_quotes(call: ast.Call, name: str, known: AbstractSet[str]) -> Iterator[Argument]:

@@ -328,17 +328,17 @@ def with_names(text: str) -> Iterator[Step]:
         ]
         parts_of = [n for n in nodes_in(block) if isinstance(n, ast.Attribute)]
         member_of = {n.value.id: n.attr for n in parts_of if isinstance(n.value, ast.Name)}
-        given = {one: kind for one, kind in made_by(nodes_in(tree)).items() if one in own}
+        given = {one: kind for one, kind in kept.items() if one in own}
         values = {n.id for n in nodes_in(block) if isinstance(n, ast.Name) and is_value(n, block)}
         idle = _meant_calls(unread, block)
         alone = {one: word for one in stated for word in ALONE if is_one_edit(one.lower(), word)}
         called = {getattr(n.func, "id", "") for n in nodes_in(block) if isinstance(n, ast.Call) and n.args}
         for name in dict.fromkeys(n.id for n in missing):
             of_python = next((one for one in OF_PYTHON if name in called and is_slip(name, one)), "")
+            use = member_of.get(name, "")
             meant = OBVIOUS_NAMES.get(name) or ("__name__" if name == "name" and _is_guard(block) else "")
-            near = own - _classes_of_rospy(tree, member_of.get(name, ""))
-            near -= functions if name in values else set()
-            near = {one for one in near if given.get(one) != name}  # `twist = Twist()` lacks an import
+            near = own - _classes_of_rospy(tree, use)
+            near = {n for n in near if given.get(n) != name and not (name in values and n in functions)}
             # `reading.state = 0` lacks `reading = Reading()`
             lost = [one for one in near if one.lower() == name.lower() and name in objects.get(one, ())]
             if lost and (first := _first_set(block, name)):
@@ -346,8 +346,8 @@ def with_names(text: str) -> Iterator[Step]:
                 return
             near -= {*lost}
             meant = meant or meant_by(name, near, near - loaded) or idle.get(name, "")
-            meant = meant or alone.get(name, of_python)
-            meant = meant or meant_by_use(name, member_of.get(name, ""), given, loaded)
+            meant = meant or alone.get(name, of_python) or meant_by_use(name, use, given, loaded)
+            meant = meant or (_unread_argument(block, name) if use else "")
             spans = [span for n in missing if n.id == name and (span := span_of(lines, n))]
             if meant and spans:
                 after = edited(text, [(*span, meant) for span in spans])
@@ -355,6 +355,17 @@ def with_names(text: str) -> Iterator[Step]:
                     yield step
                     yield from with_names(step["text"])
                     return
+
+
+def _unread_argument(block: ast.stmt, name: str) -> str:
+    """Return the only argument of a function, which it does not read: that is meant by `data.data` where the callback
+    takes a `message`; "" where it reads it or has others. `this` is `self`."""
+    if name == "this" and "self" in bound_in(block):
+        return "self"
+    taken = block.args.args if isinstance(block, ast.FunctionDef) else []
+    names = [one.arg for one in taken if one.arg != "self"]
+    read = {n.id for n in nodes_in(block) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Load)}
+    return names[0] if len(names) == 1 and names[0] not in read else ""
 
 
 def _missing_in(

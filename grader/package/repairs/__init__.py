@@ -30,6 +30,7 @@ from grader.package.repairs.editing import (
     Files,
     NotRepairable,
     exchange_contents,
+    keep_last_version,
     make_executable,
     read_data,
     rename_everywhere,
@@ -94,6 +95,8 @@ def find_repairs(folder: Path, package: PackageFacts, wanted: Wanted) -> tuple[R
     rename_files(files, renames)
     sources = (f.path for f in scripts if f.python and f.link is None and not f.is_no_script)
     paths = [renames.get(path, path) for path in sources]
+    for path in paths:
+        keep_last_version(files, path, _names_of(path, wanted))
     names = repair_python(
         files, paths, package, wanted.types, {renames.get(f.path, f.path) for f in imported}
     )
@@ -121,6 +124,11 @@ def find_repairs(folder: Path, package: PackageFacts, wanted: Wanted) -> tuple[R
         repair_script_keys(files, package, script, names[script], wanted)
     exchange_files(files, names, wanted)
     return tuple(sorted(files.repairs, key=lambda repair: KINDS.index(repair.kind)))
+
+
+def _names_of(path: str, wanted: Wanted) -> list[str]:
+    """Return what the lab's script of this name has to use: of its node, topics and services."""
+    return [used for of, _, used in wanted.does if PurePosixPath(of).name == PurePosixPath(path).name]
 
 
 def _of_lab(names: Iterable[str], wanted: Wanted) -> list[str]:

@@ -10,7 +10,7 @@ import re
 import secrets
 import stat
 import sys
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
@@ -20,7 +20,7 @@ from grader.files import atomic_write, open_untrusted
 from grader.line_slips.python_habits import MERGED
 from grader.model.package import CMAKE, MANIFEST
 from grader.model.repair import Repair, RepairKind, added_lines, lines_to_write, messages_of
-from grader.package.lint.script_blocks import first_version
+from grader.package.lint.script_blocks import first_version, last_version
 from grader.package.reading import LEFT_OUT
 from grader.package.repairs.well_formed import well_formed
 from grader.package.xml import (
@@ -161,6 +161,9 @@ class Files:
 
 BLANKS_ABOVE = "delete the blank lines above the first tag"
 KEEP_ONE = "keep one of the two versions; for the first one, delete {emptied}"
+KEEP_LAST = (
+    "keep one of the two versions; for the second one, which has the names of this lab, delete {emptied}"
+)
 
 
 def keep_first_version(files: Files, file: str, kind: RepairKind) -> bool:
@@ -173,6 +176,19 @@ def keep_first_version(files: Files, file: str, kind: RepairKind) -> bool:
         # nothing may stand above an XML declaration
         files.change(kind, file, kept.lstrip("\n"), f"line {line} of {file}: {MERGED}", fix)
     return kept != text
+
+
+def keep_last_version(files: Files, file: str, names: Collection[str]) -> None:
+    """Of git's merge markers in a script and the versions between them, keep the last one where more of the `names` are
+    in it, in quotes, than in the first one."""
+    text = files.text(file) or ""
+    first, last = first_version(text), last_version(text)
+    quoted = [re.compile(rf"([\"'])/?{re.escape(name.strip('/'))}\1") for name in names]
+    counts = [sum(one.search(version) is not None for one in quoted) for version in (first, last)]
+    if first != text and counts[1] > counts[0]:
+        line, _, _ = changed_lines(text, last)
+        fix = KEEP_LAST.format(emptied=emptied_lines(text, last))
+        files.change("python-syntax", file, last, f"line {line} of {file}: {MERGED}", fix)
 
 
 def emptied_lines(before: str, after: str) -> str:

@@ -6,27 +6,65 @@ The line is known by what a criterion cites or says, and what to write there by 
 from __future__ import annotations
 
 import re
-from pathlib import Path
+from collections.abc import Callable
+from pathlib import Path, PurePosixPath
 
-from grader.model.repair import Repair
+from grader.model.repair import RENAMED, Repair
 from grader.package.repairs.editing import Files
-from grader.wording import ASKED_RATE, ASKED_TYPE, CONVERTED, NO_SEMICOLON, SWAPPED, TEXT_PLACE, convert
+from grader.wording import (
+    ASKED_RATE,
+    ASKED_TYPE,
+    CONVERTED,
+    HIDING,
+    IN_PLACE_OF_SPIN,
+    NO_SEMICOLON,
+    SWAPPED,
+    TEXT_PLACE,
+    WRITE_HANDLER,
+    convert,
+)
 
 
 def repairs_by_hint(folder: Path, hint: str, file: str, line: int) -> list[Repair]:
     """Return the repairs of a lost criterion that cites this line first."""
-    if (rate := ASKED_RATE.search(hint)) is not None:
-        return loop_rate(folder, rate[1], int(rate[2]), rate[3])
-    if (asked := ASKED_TYPE.search(hint)) is not None:
-        return message_type(folder, file, line, asked[1], asked[2])
-    if (turned := SWAPPED.search(hint)) is not None:
-        return swapped_arguments(folder, file, int(turned[1]), turned[2])
-    if (end := NO_SEMICOLON.search(hint)) is not None:
-        return with_semicolon(folder, file, int(end[1]) - 1 if end[1] else line)
-    if TEXT_PLACE in hint:
-        return text_place(folder, file, line)
-    told = CONVERTED.search(hint)
-    return conversions(folder, file, line, told[1], told[2]) if told else []
+    for pattern, repairs in BY_HINT:
+        if (found := pattern.search(hint)) is not None:
+            return repairs(folder, file, line, found)
+    return []
+
+
+def narrow_handler(folder: Path, file: str, line: int, right: str) -> list[Repair]:
+    """Return the repair of an `except` that drops every error, after which Python shows what it dropped."""
+    files = Files(folder=folder.resolve())
+    lines = (files.text(file) or "").split("\n")
+    found = re.match(r"([ \t]*)except\b[^:]*:", lines[line - 1]) if line <= len(lines) else None
+    if found is not None:
+        lines[line - 1] = found[1] + right + lines[line - 1][found.end() :]
+        message = f"line {line} of {file}: drops every error"
+        files.change("missing-call", file, "\n".join(lines), message)
+    return list(files.repairs)
+
+
+def sleep_for_spin(folder: Path, file: str, line: int, right: str) -> list[Repair]:
+    """Return the repair that writes `right`, such as `rate.sleep()`, in place of the `spin()` of a line in a loop."""
+    files = Files(folder=folder.resolve())
+    lines = (files.text(file) or "").split("\n")
+    found = re.fullmatch(r"([ \t]*)(?:\w+\.)?spin\(\)(.*)", lines[line - 1]) if line <= len(lines) else None
+    if found is not None:
+        lines[line - 1] = f"{found[1]}{right}{found[2]}"
+        message = f"line {line} of {file}: waits until the node ends"
+        files.change("missing-call", file, "\n".join(lines), message)
+    return list(files.repairs)
+
+
+def no_longer_hiding(file: str) -> Repair:
+    """Return the repair that renames a file which has the name of a module that its neighbours import."""
+    path = PurePosixPath(file)
+    new = str(path.with_name(f"{RENAMED}{path.name}"))
+    message = f"{file} hides the module {path.stem}"
+    return Repair(
+        kind="file-name", file=file, before=file, after=new, message=message, fix=f"mv {file} {new}"
+    )
 
 
 def conversions(folder: Path, file: str, line: int, function: str, value: str) -> list[Repair]:
@@ -150,3 +188,20 @@ def other_field(folder: Path, file: str, field: str, other: str) -> Repair | Non
     fix = f"write `.{field} = …`, not `.{other} = …`"
     files.change("other-field", file, given.sub(lambda _: field, text), message, fix)
     return next(iter(files.repairs), None)
+
+
+BY_HINT: tuple[tuple[re.Pattern[str], Callable[[Path, str, int, re.Match[str]], list[Repair]]], ...] = (
+    (ASKED_RATE, lambda folder, _, __, told: loop_rate(folder, told[1], int(told[2]), told[3])),
+    (ASKED_TYPE, lambda folder, file, line, told: message_type(folder, file, line, told[1], told[2])),
+    (SWAPPED, lambda folder, file, _, told: swapped_arguments(folder, file, int(told[1]), told[2])),
+    (
+        NO_SEMICOLON,
+        lambda folder, file, line, told: with_semicolon(folder, file, int(told[1] or line + 1) - 1),
+    ),
+    (HIDING, lambda _, __, ___, told: [no_longer_hiding(told[1])]),
+    (WRITE_HANDLER, lambda folder, file, _, told: narrow_handler(folder, file, int(told[1]), told[2])),
+    (IN_PLACE_OF_SPIN, lambda folder, file, _, told: sleep_for_spin(folder, file, int(told[1]), told[2])),
+    (re.compile(re.escape(TEXT_PLACE)), lambda folder, file, line, _: text_place(folder, file, line)),
+    (CONVERTED, lambda folder, file, line, told: conversions(folder, file, line, told[1], told[2])),
+)
+"""What a hint says, and the repairs that do it, given the folder, the cited file and line, and what was found."""
