@@ -233,6 +233,10 @@ IN_PLACE_OF_SPIN = re.compile(r"on line (\d+), write `([\w.]+\.sleep\([\d.]*\))`
 """The line and the call in the fix of a `spin()` in a loop, which `package/lint` writes."""
 
 
+IN_PLACE_OF_INPUT = re.compile(r"on line (\d+), write `(rospy\.spin\(\))` in place of `input\(\)`")
+"""The line and the call in the fix of an `input()` that keeps a node alive, which `package/lint` writes."""
+
+
 HIDING = re.compile(r"give ([\w./-]+\.py) another name, everywhere it is named")
 """The file in a hint of `rename_hiding`."""
 

@@ -324,6 +324,8 @@ def _with_lines(
     """Return the verdict with the lines of the script that make the steps wrong."""
     if wrong:
         verdict = _with_left_out(verdict, count, run, package, topic)
+    if wrong and all(step.change == 0 for step in wrong):
+        verdict = cite_slip(verdict, count, run, package, "publish-twice")
     texts = [s for s in slips_of(package, run, count.callerid, "counter-type") if s.name == "text"]
     kinds: tuple[SlipKind, ...] = ("counter-type",) if texts else ("no-effect", "set-in-loop")
     verdict = cite_slip(verdict, count, run, package, *kinds)

@@ -463,7 +463,7 @@ def _asks_for_input(
     asks, fixes, instead = {s.line: s.name for s in own}, [s.fix for s in own if s.fix], ""
     if len(asks) > 1:
         instead = f"write values in the code in place of each `input()`: {on_lines(sorted(asks))}"
-    elif fixes and fixes[0].startswith("publish …"):
+    elif fixes and fixes[0].startswith(("publish …", "on line")):
         instead = fixes[0].replace("…", VALUE_SLOT, 1)
     elif number := _NUMBER_ASKED.search(found.innermost.source):
         value = "a number in the code" if "once" in asks.values() else VALUE_SLOT

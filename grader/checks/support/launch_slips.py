@@ -166,6 +166,7 @@ def _absent(package: PackageFacts, launch: str, wanted: set[str]) -> Verdict:
         hint = f"{hint}, with the <node>s of {join_words(parts)} in it"
     remark = next(iter(() if movable or guessed else package.hints_on(launch)), "").partition(": ")
     seen, hint = (f"; {remark[0]}", remark[2]) if remark[0] else (seen, hint)
+    seen += ", which is a launch file of ROS 2: roslaunch reads XML" if package.file(f"{path}.py") else ""
     kind: MistakeKind = "file-elsewhere" if movable or guessed else "file-missing"
     cited = (FileCitation(file=movable[0] if movable else path),)
     return failed(f"{launch} is not in the package{seen}", hint=hint, citations=cited).lost_by(kind, path)

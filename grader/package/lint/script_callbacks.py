@@ -215,6 +215,10 @@ def wrong_callback(own, call, tree, bound, values):
     if with_args := fix_of_args(own, call, tree, bound):
         return "", with_args
     kept = [name for name in given if not bound or name != "self"]
+    if called_name(call) == "Service" and len(kept) > 1 and not own.args.defaults:
+        told = ", ".join(["self"] * bound + ["request"])
+        fields = ", ".join("request." + name for name in kept)
+        return "", "write `def %s(%s):`, and below it, `%s = %s`" % (own.name, told, ", ".join(kept), fields)
     spare = [unknown_name(own, tree) or VALUES.get(called_name(call), "msg"), "args"]
     kept = ["self"] * bound + (kept + spare[len(kept) :])[:values]
     return "", "write `def %s(%s):`%s" % (own.name, ", ".join(kept), made_response(own, call, kept))

@@ -397,6 +397,7 @@ def publishes_twice(tree):
                 by_publisher.setdefault(ast.dump(one.value.func), []).append(one)
         many = next((same for same in by_publisher.values() if len(same) > 1), None)
         if many is None:
+            yield from published_in_if_too(loop, by_publisher)
             continue
         first, last = (loop.body.index(one) for one in (many[0], many[-1]))
         if any(calls_in(n, *WAITS) for n in loop.body[first:last]):
@@ -409,6 +410,19 @@ def publishes_twice(tree):
             message = "each pass through the loop publishes on " + listed(lines)
             fix = "delete all but one of " + listed(lines)
         yield slip(lines[1], "publish-twice", message, fix)
+
+
+def published_in_if_too(loop, by_publisher):
+    """Yield the one line in an `if` of a loop that publishes what the loop publishes in each turn anyway."""
+    choices = [one for one in loop.body if isinstance(one, ast.If) and not calls_in(one, *WAITS)]
+    again = [
+        (one, n) for one in choices for n in calls_in(one, "publish") if ast.dump(n.func) in by_publisher
+    ]
+    leaves = any(isinstance(n, (ast.Continue, ast.Break, ast.Return)) for n in ast.walk(loop))
+    if len(again) == 1 and not leaves:
+        one, call = again[0]
+        message = "line %d publishes once more, in the `if` on line %d" % (call.lineno, one.lineno)
+        yield slip(call.lineno, "publish-twice", message, "delete line %d" % call.lineno)
 
 
 def is_short(sleep):

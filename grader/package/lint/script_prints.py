@@ -184,6 +184,9 @@ class Printing:
         for n in self.nodes:
             if isinstance(n, STORING) and n.value is not None:
                 self.follow(n, outer)
+            elif is_call(n, *COLLECTS) and any(self.holds(one)[0] for one in n.args):
+                # what collects messages holds this one
+                self.known.setdefault(dotted(n.func.value), (place(n), False))
         self.prints = [n for n in self.nodes if is_print(n)]
 
     def follow(self, assigned, outer):
@@ -391,14 +394,27 @@ class Printing:
         for one in reversed(body):
             if isinstance(one, LEAVES):
                 after = NEVER
-            elif isinstance(one, ast.If) and not calls_in(one.test, "is_shutdown"):
+            elif isinstance(one, ast.If) and not (
+                calls_in(one.test, "is_shutdown") or self.is_there(one.test)
+            ):
                 ways = {self.whether(one.body, after), self.whether(one.orelse, after)}
                 after = ways.pop() if len(ways) == 1 else UNKNOWN if UNKNOWN in ways else one
-            elif isinstance(one, (ast.Try, ast.With, ast.If)):
+            elif isinstance(one, (ast.Try, ast.With, ast.If)):  # an `if` that holds of each message
                 after = self.whether(one.body, after)
             elif any(is_print(n) and self.of_message(n) for n in ast.walk(one)):
                 after = ALWAYS if isinstance(one, ast.Expr) and is_print(one.value) else UNKNOWN
         return after
+
+    def is_there(self, test):
+        """Whether a condition asks only whether there is a text: `msg.data != ''`, `msg.data and msg.data is not None`.
+        That a number is not 0 is another question."""
+        parts = test.values if isinstance(test, ast.BoolOp) and isinstance(test.op, ast.And) else [test]
+        compared = [
+            n for n in parts if isinstance(n, ast.Compare) and isinstance(n.ops[0], (ast.NotEq, ast.IsNot))
+        ]
+        empty = [getattr(n.comparators[0], "value", 0) for n in compared if dotted(n.left) == self.value]
+        others = [n for n in parts if n not in compared and not ("" in empty and dotted(n) == self.value)]
+        return not others and len(empty) == len(compared) and all(one in ("", None) for one in empty)
 
 
 def under_condition(one, prints):

@@ -295,7 +295,7 @@ def overwritten(loop, choice):
         {
             dotted(n.targets[0]): n.value
             for n in block
-            if isinstance(n, ast.Assign) and isinstance(getattr(n.value, "operand", n.value), ast.Constant)
+            if isinstance(n, ast.Assign) and is_fixed(getattr(n.value, "operand", n.value))
         }
         for block in (choice.body, choice.orelse)
     )
@@ -306,11 +306,17 @@ def overwritten(loop, choice):
         near = type(choice.test.ops[0]) in BELOW
         value = (other if near else one)[names[0]]
         sign = {ast.USub: "-", ast.Not: "not ", ast.Invert: "~"}.get(type(getattr(value, "op", None)), "")
-        usual = sign + repr(getattr(value, "operand", value).value)
+        plain = getattr(value, "operand", value)
+        usual = sign + (repr(plain.value) if isinstance(plain, ast.Constant) else plain.id)
         message = "each turn of this loop sets `%s`, so that only the last one counts" % names[0]
         fix = "set `%s` to %s above the loop on line %d, and not in the `%s`"
         fix %= (names[0], usual, loop.lineno, "else" if near else "if")
         yield slip(choice.lineno, "wrong-value", message, fix, "added")
+
+
+def is_fixed(node):
+    """Whether it is a number, a text or the like, or a name in capitals, as a constant has."""
+    return isinstance(node, ast.Constant) or (isinstance(node, ast.Name) and node.id.isupper())
 
 
 def bound_of(node):

@@ -127,7 +127,7 @@ def uncalled_and_asked(tree):
             message = "`%s()` waits for someone to type, and a graded node gets no input" % name
             line = numbered(node, tree)
             fix = "delete line %d, which makes a number of it" % line if line else ""
-            fix = decided_by(node, tree) or fix
+            fix = decided_by(node, tree) or fix or keeps_alive(node, tree)
             yield slip(node.lineno, "input", message, fix, how_often(node, tree))
             if name == "input" and not line and kept.get(id(node), "...") != "...":
                 yield slip(node.lineno, "typed-text", name, name=kept[id(node)])
@@ -288,6 +288,14 @@ def numbered(node, tree):
     made = [n for n in assigned if called_name(n.value) in ("int", "float") and dotted(n.targets[0]) in given]
     own = [n for n in made if [dotted(one) for one in n.value.args] == [dotted(n.targets[0])]]
     return min((n.lineno for n in own), default=0)
+
+
+def keeps_alive(node, tree):
+    """Return what to write in place of an `input()` that only keeps the node from ending."""
+    is_alone = isinstance(parents_of(tree).get(node), ast.Expr) and node.lineno == node.end_lineno
+    if not is_alone or all_of(tree, *LOOPS) or calls_in(tree, "spin") or not calls_in(tree, "init_node"):
+        return ""
+    return "on line %d, write `rospy.spin()` in place of `input()`" % node.lineno
 
 
 def decided_by(node, tree):

@@ -286,11 +286,13 @@ def _wrong_arguments(tree: ast.Module, kinds: list[str]) -> Iterator[Argument]:
             yield from _type_of_topic(call, types, functions) if name in {"Publisher", "Subscriber"} else ()
             yield from _without_value(call, name, known)
             yield from _numbers(call, name)
+            yield from _numbers_by_name(call, name, values)
             yield from _callback(call, name, functions)
             yield from _without_callback(call, tree) if name == "Subscriber" else ()
             yield from _subscribed(call, name, functions | methods)
             yield from _without_quotes(call, name, functions)
             yield from _given_too_much(call, name)
+            yield from _value_first(call, name)
 
 
 TAKE_NOTHING = frozenset({"spin", "is_shutdown", "get_time", "get_rostime", "get_name", "get_namespace"})
@@ -302,6 +304,14 @@ def _given_too_much(call: ast.Call, name: str) -> Iterator[Argument]:
     if name in TAKE_NOTHING and (call.args or call.keywords):
         why = f"`{name}` is given a value, and rospy's takes none"
         yield Argument([(call, f"{ast.unparse(call.func)}()")], why)
+
+
+def _value_first(call: ast.Call, name: str) -> Iterator[Argument]:
+    """Of `set_param(55555, '/phone')`."""
+    first, second, *_ = [*call.args, None, None]
+    if name == "set_param" and first is not None and _is_number(first) and is_text(second):
+        edits: list[tuple[ast.expr, str]] = [(first, repr(second.value)), (second, ast.unparse(first))]
+        yield Argument(edits, "the parameter's name comes first, then its value")
 
 
 def _in_quotes(call: ast.Call, name: str, known: AbstractSet[str]) -> Iterator[Argument]:
@@ -463,6 +473,19 @@ def _numbers(call: ast.Call, name: str) -> Iterator[Argument]:
         owner = ast.unparse(call.func.value)
         edit = (first, f"{owner}.Duration({ast.unparse(first)})")
         yield Argument([edit], "a Timer takes a Duration, not a number")
+
+
+def _numbers_by_name(
+    call: ast.Call, name: str, values: Sequence[tuple[ast.expr, ast.expr]]
+) -> Iterator[Argument]:
+    """Of `Rate(hz)` where `hz` is `"10"`, or a parameter whose default is that."""
+    given = call.args[0] if call.args and name in {"Rate", "sleep", "Duration"} else None
+    made = [value for target, value in values if given and ast.unparse(target) == ast.unparse(given)]
+    text: ast.expr | None = made[0] if len(made) == 1 else None
+    if isinstance(text, ast.Call) and called(text) == "get_param" and len(text.args) == 2:
+        text = text.args[1]
+    if text is not None and is_text(text) and text.value.replace(".", "", 1).isdigit():
+        yield Argument([(text, text.value)], f"`rospy.{name}` takes a number, and this is a string")
 
 
 def _callback(call: ast.Call, name: str, functions: set[str]) -> Iterator[Argument]:

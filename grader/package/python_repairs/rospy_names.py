@@ -262,6 +262,19 @@ def with_init(text: str, name: str) -> Iterator[Step]:
         yield from step_to("init", at + 1, text, after, line)
 
 
+def with_named_node(text: str, name: str) -> Iterator[Step]:
+    """`init_node(sys.argv[1])`: the node gets the script's name, as nothing gives it one."""
+    tree, lines = tree_of(text), text.split("\n")
+    for call in (n for n in nodes_in(tree) if isinstance(n, ast.Call) and n.args and name.isidentifier()):
+        given = call.args[0]
+        of_argv = isinstance(given, ast.Subscript) and last_name(given.value) == "argv"
+        span = span_of(lines, given) if of_argv and last_name(call.func) == "init_node" else None
+        if span is not None:
+            why = "the node's name is read from the command line, and nothing gives one there"
+            yield from step_to("argument", span[0] + 1, text, edited(text, [(*span, repr(name))]), why)
+            return
+
+
 NEED_NODE = ("Rate", "sleep", "get_time", "get_rostime", "Time.now", "wait_for_message")
 """What fails in rospy before the node is made."""
 
@@ -314,7 +327,11 @@ def with_node_first(text: str) -> Iterator[Step]:
         place = next(
             (i for i, one in enumerate(calls) if last_name(getattr(one, "func", None)) == "init_node"), 0
         )
-        early = [i for i, one in enumerate(block[:place]) if not needing.isdisjoint(_called_now(one))]
+        early = [
+            i
+            for i, one in enumerate(block[:place])
+            if not needing.isdisjoint(_called_now(one)) or _reads_private(one)
+        ]
         if not early:
             continue
         first, init, end = block[early[0]], block[place], block[place].end_lineno or 0
@@ -334,6 +351,15 @@ def _called_now(statement: ast.stmt) -> set[str]:
     if isinstance(statement, ast.FunctionDef | ast.ClassDef):
         return set()
     return {ast.unparse(n.func) for n in nodes_in(statement) if isinstance(n, ast.Call)}
+
+
+def _reads_private(statement: ast.stmt) -> bool:
+    """Return whether a statement asks for a parameter of the node's own, as `~rate`, whose name the node's begins."""
+    if isinstance(statement, ast.FunctionDef | ast.ClassDef):
+        return False
+    calls = (n for n in nodes_in(statement) if isinstance(n, ast.Call) and n.args)
+    asked = (n.args[0] for n in calls if last_name(n.func) in {"get_param", "has_param", "set_param"})
+    return any(isinstance(one, ast.Constant) and str(one.value).startswith("~") for one in asked)
 
 
 def _is_head(statement: ast.stmt) -> bool:

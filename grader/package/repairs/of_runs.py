@@ -16,6 +16,7 @@ from grader.wording import (
     ASKED_TYPE,
     CONVERTED,
     HIDING,
+    IN_PLACE_OF_INPUT,
     IN_PLACE_OF_SPIN,
     NO_SEMICOLON,
     SWAPPED,
@@ -45,16 +46,21 @@ def narrow_handler(folder: Path, file: str, line: int, right: str) -> list[Repai
     return list(files.repairs)
 
 
-def sleep_for_spin(folder: Path, file: str, line: int, right: str) -> list[Repair]:
-    """Return the repair that writes `right`, such as `rate.sleep()`, in place of the `spin()` of a line in a loop."""
+def other_call(folder: Path, file: str, line: int, right: str, *, wrong: str, why: str) -> list[Repair]:
+    """Return the repair that writes `right`, such as `rate.sleep()`, in place of a line that is only a call of what
+    matches `wrong`."""
     files = Files(folder=folder.resolve())
     lines = (files.text(file) or "").split("\n")
-    found = re.fullmatch(r"([ \t]*)(?:\w+\.)?spin\(\)(.*)", lines[line - 1]) if line <= len(lines) else None
+    found = (
+        re.fullmatch(rf"([ \t]*)(?:{wrong})([ \t]*(?:#.*)?)", lines[line - 1]) if line <= len(lines) else None
+    )
     if found is not None:
         lines[line - 1] = f"{found[1]}{right}{found[2]}"
-        message = f"line {line} of {file}: waits until the node ends"
-        files.change("missing-call", file, "\n".join(lines), message)
+        files.change("missing-call", file, "\n".join(lines), f"line {line} of {file}: {why}")
     return list(files.repairs)
+
+
+SPIN, INPUT = r"(?:\w+\.)?spin\(\)", r"(?:raw_)?input\([^()]*\)"
 
 
 def no_longer_hiding(file: str) -> Repair:
@@ -200,7 +206,18 @@ BY_HINT: tuple[tuple[re.Pattern[str], Callable[[Path, str, int, re.Match[str]], 
     ),
     (HIDING, lambda _, __, ___, told: [no_longer_hiding(told[1])]),
     (WRITE_HANDLER, lambda folder, file, _, told: narrow_handler(folder, file, int(told[1]), told[2])),
-    (IN_PLACE_OF_SPIN, lambda folder, file, _, told: sleep_for_spin(folder, file, int(told[1]), told[2])),
+    (
+        IN_PLACE_OF_SPIN,
+        lambda folder, file, _, told: other_call(
+            folder, file, int(told[1]), told[2], wrong=SPIN, why="waits until the node ends"
+        ),
+    ),
+    (
+        IN_PLACE_OF_INPUT,
+        lambda folder, file, _, told: other_call(
+            folder, file, int(told[1]), told[2], wrong=INPUT, why="waits for input"
+        ),
+    ),
     (re.compile(re.escape(TEXT_PLACE)), lambda folder, file, line, _: text_place(folder, file, line)),
     (CONVERTED, lambda folder, file, line, told: conversions(folder, file, line, told[1], told[2])),
 )

@@ -147,7 +147,9 @@ def _without_fault(text: str, at: int, wanted: Wanted) -> _Repaired | None:
     if tabbed is not None and tabbed <= at:
         why = f"line {tabbed} of {{path}} is indented with a tab, which YAML does not accept"
         plain = [_Repaired(one, why, _begin(one, lines, tabbed)) for one in _untabbed(lines, tabbed)]
-        return _best(plain, wanted)
+        # with another fault further down, no text can be read yet
+        left = [one for one in plain if not any("\t" in indent_of(line) for line in one.text.split("\n"))]
+        return _best(plain, wanted) or next(iter(left), None)
     if slip := slip_of_yaml(text, at):
         comment = re.search(r"\s+#.*", lines[slip.number - 1])
         changed = f"{indent_of(lines[slip.number - 1])}{slip.right}{comment[0] if comment else ''}"
