@@ -151,7 +151,7 @@ class PythonSlip(Placed, Record):
       last line of the `try`'s block, `fix` the name that the `except` gives the error.
     - `no-result`: where an action's goal is ended by the call `name` without a result.
     - `swallows`: an `except` of every error that does nothing, or prints what is always the same: a slip only if the
-      script does not do what it should.
+      script does not do what it should; `name` is `run` where it is around what the node does as long as it runs.
     - `unused-import`, `lacking-import`: an import of the module `message` whose names nothing in the script uses, or
       that Python did not find where the files were read (`fix`: the name of a module in it, as `lab_msgs.msg`).
     """

@@ -247,7 +247,7 @@ def _not_run(life: Life, run: Run, package: PackageFacts) -> Ending | None:
     slips = [
         s
         for s in own
-        if (s.kind != "commented-out" or s.name == "spin")
+        if (s.kind not in {"commented-out", "swallows"} or s.name in {"spin", "run"})
         and (s.kind != "not-called" or s.name.rpartition(".")[2] not in ("sleep", "is_shutdown"))
     ]
     if not slips:

@@ -128,8 +128,7 @@ def _absent(package: PackageFacts, launch: str, wanted: set[str]) -> Verdict:
     guessed = [] if full else package.launches_of(programs)[:1]
     others, names = [f.path for f in package.launch_files], paths_by_name(package)
     near = [names[n] for n in near_names(launch, names)]
-    stem = PurePosixPath(launch).stem
-    near += [p for n, p in names.items() if n == f"{stem}.xml" and p not in near]
+    near += [p for n, p in names.items() if n == f"{PurePosixPath(launch).stem}.xml" and p not in near]
     seen = f"; {there_is(dict.fromkeys([*near, *others]))}" if near or others else ""
     files = {file.path: file for file in package.launch_files}
     if starting := full or guessed:
@@ -166,9 +165,9 @@ def _absent(package: PackageFacts, launch: str, wanted: set[str]) -> Verdict:
         hint = f"{hint}, with the <node>s of {join_words(parts)} in it"
     remark = next(iter(() if movable or guessed else package.hints_on(launch)), "").partition(": ")
     seen, hint = (f"; {remark[0]}", remark[2]) if remark[0] else (seen, hint)
-    seen += ", which is a launch file of ROS 2: roslaunch reads XML" if package.file(f"{path}.py") else ""
     kind: MistakeKind = "file-elsewhere" if movable or guessed else "file-missing"
     cited = (FileCitation(file=movable[0] if movable else path),)
+    seen += ", which is a launch file of ROS 2: roslaunch reads XML" if package.file(f"{path}.py") else ""
     return failed(f"{launch} is not in the package{seen}", hint=hint, citations=cited).lost_by(kind, path)
 
 

@@ -215,7 +215,10 @@ def wrong_callback(own, call, tree, bound, values):
     if with_args := fix_of_args(own, call, tree, bound):
         return "", with_args
     kept = [name for name in given if not bound or name != "self"]
-    if called_name(call) == "Service" and len(kept) > 1 and not own.args.defaults:
+    parts = [dotted(n.value) for n in ast.walk(own) if isinstance(n, ast.Attribute)]
+    # of values that have none of their own, each may be a field of the request
+    plain = len(kept) > 1 and not own.args.defaults and not set(kept) & set(parts)
+    if called_name(call) == "Service" and plain:
         told = ", ".join(["self"] * bound + ["request"])
         fields = ", ".join("request." + name for name in kept)
         return "", "write `def %s(%s):`, and below it, `%s = %s`" % (own.name, told, ", ".join(kept), fields)

@@ -381,13 +381,17 @@ HELD_UP = {"sleep", "spin", "is_shutdown"}
 
 def dropped_errors(tree):
     """An `except` of every error, around what calls something, that says nothing of the error and goes on."""
+    stays = calls_in(tree, "spin") or all_of(tree, ast.While)
+    own = {"init_node", "spin", *functions_in(tree)}
     for one in all_of(tree, ast.Try):
         calls = {called_name(n) for part in one.body for n in ast.walk(part) if isinstance(n, ast.Call)}
         for handler in one.handlers:
             if calls - HELD_UP and dotted(handler.type).rpartition(".")[2] in BROAD and says_nothing(handler):
                 message = "line %d drops every error, and says nothing of it" % handler.lineno
                 fix = "on line %d, write `except rospy.ROSInterruptException:`" % handler.lineno
-                yield slip(handler.lineno, "swallows", message, fix)
+                # what does not stay alive in any case ends without an error, too
+                runs = stays and (calls & own or any(isinstance(n, ast.While) for n in one.body))
+                yield slip(handler.lineno, "swallows", message, fix, "run" if runs else "")
 
 
 def says_nothing(handler):

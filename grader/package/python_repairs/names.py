@@ -208,9 +208,15 @@ def with_parameters(text: str) -> Iterator[Step]:
         kept = own[: isinstance(given, ast.Attribute)]
         value = _name_of_value(tree, function, own[len(kept) :], usual)
         head = re.fullmatch(r"(\s*def\s+\w+\s*\()[\w\s,]*(\).*)", lines[function.lineno - 1])
-        if head is None or not value or len(own) == len(kept) + 1 or (kept and kept != ["self"]):
+        if head is None or len(own) == len(kept) + 1 or (kept and kept != ["self"]):
             continue
-        line = f"{head[1]}{', '.join([*kept, value])}{head[2]}"
+        fields = _fields_taken(function, own[len(kept) :]) if usual == "request" and not value else []
+        if not (value or fields):
+            continue
+        line = f"{head[1]}{', '.join([*kept, value or usual])}{head[2]}"
+        if fields:  # one for each field of the request
+            read = f"{', '.join(fields)} = {', '.join(f'{usual}.{name}' for name in fields)}"
+            line += f"\n{' ' * function.body[0].col_offset}{read}"
         after = "\n".join([*lines[: function.lineno - 1], line, *lines[function.lineno :]])
         why = f"`{function.name}` takes {plural(len(own), 'argument')}, but ROS passes it "
         why += f"{'`self` and ' if kept else ''}the {usual.replace('msg', 'message')}"
@@ -218,6 +224,12 @@ def with_parameters(text: str) -> Iterator[Step]:
             yield step
             yield from with_parameters(step["text"])
             return
+
+
+def _fields_taken(function: ast.FunctionDef, names: list[str]) -> list[str]:
+    """Return the arguments of a function that may each be a field of a request; none where one is more than a value."""
+    parts = {last_name(n.value) for n in nodes_in(function) if isinstance(n, ast.Attribute)}
+    return names if function.body[0].lineno > function.lineno and parts.isdisjoint(names) else []
 
 
 def _only_as_callback(tree: ast.Module, given: ast.expr | None) -> ast.FunctionDef | None:
