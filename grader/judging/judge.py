@@ -140,7 +140,7 @@ def judge_all_runs(
     if split.repaired:
         of_copy = try_facts(rubric, {**first, **split.repaired})
         on_copy = judge_facts(rubric, of_copy, checks)
-        doubtful_on_copy = _doubtful_on_copy(rubric, verdicts, on_copy)
+        doubtful_on_copy = _doubtful_on_copy(rubric, verdicts, on_copy) & split.repaired.keys()
         if later := split.repaired_again:
             again = judge_facts(rubric, try_facts(rubric, {**first, **split.repaired, **later}), checks)
             on_copy = drop_unrepeated_losses(rubric, on_copy, again, later.keys())

@@ -94,6 +94,15 @@ def test_what_one_run_of_the_copy_lost_and_the_next_one_did_not_costs_nothing() 
         assert [found[name].points for name in ("rate", "chatter", "node")] == [points, points, 0]
 
 
+def test_a_scenario_that_the_copy_did_not_run_is_not_repeated_on_it() -> None:
+    """The copy may only be built; what the first run lost by its timing is then repeated as handed in."""
+    late = {**GOOD_RUN, "topics": [], "graph": []}
+    slow, on_time = (build_runs({"runs": {"talker": run}, "package": PACKAGE}) for run in (late, GOOD_RUN))
+    copy = {name: run for name, run in on_copy(on_time, TABS).items() if not name.endswith("/talker")}
+    runs = slow | {"repeated-1/talker": on_time["talker"]} | copy
+    assert not judge_all_runs(rubric(*ALL), runs).doubtful_on_copy
+
+
 @pytest.mark.parametrize("repair", [TABS, TOPIC])
 def test_one_fault_is_charged_once_where_no_criterion_requires_another(repair: Repair) -> None:
     first = DIED if repair is TABS else {**GOOD_RUN, "topics": [{"topic": "/chater", "count": 61}]}
