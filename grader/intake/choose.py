@@ -80,7 +80,7 @@ def _choose(candidates: list[Candidate], wanted: WantedPackage) -> Choice | None
     """Return the lab's package: by its manifest's name, by that in other case, by its folder's name, in this order.
 
     What catkin does not see (a marker file, no manifest) comes after all that it does see. Last comes the only name
-    that is nearly right. With `wanted.asked`, only that name counts.
+    that is nearly right, or before a folder that has no more than scripts. With `wanted.asked`, only that name counts.
     """
     packages = [c for c in candidates if c.has_manifest]
     seen = [c for c in packages if c.ignored_by is None]
@@ -95,10 +95,13 @@ def _choose(candidates: list[Candidate], wanted: WantedPackage) -> Choice | None
             if matches:
                 return _best(matches, wanted)
     bare = [c for c in bare if _in_folder(c, wanted.name) and not any(_below(p, c) for p in packages)]
-    if bare:  # A workspace of the lab's name has `src/` too; the package in it has the CMakeLists.txt.
-        return _best([c for c in bare if c.has_cmake] or bare, wanted)
     near = [c for c in seen if c.manifest is not None and is_slip(c.manifest, wanted.name)]
-    return _best(near, wanted) if len({c.manifest for c in near}) == 1 else None
+    near = near if len({c.manifest for c in near}) == 1 else []
+    made = [c for c in bare if c.has_cmake]
+    # A folder of scripts is no package where one with the lab's files is beside it.
+    if bare and (made or not any(_files_of(c.folder, wanted.files) for c in near)):
+        return _best(made or bare, wanted)  # A workspace has `src/` too; the package in it has the CMakeLists.txt.
+    return _best(near, wanted) if near else None
 
 
 def choose_loose(

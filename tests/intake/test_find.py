@@ -267,6 +267,15 @@ def test_a_folder_of_another_package_is_not_taken_for_it_either(tmp_path):
         opened(repo / "week1", tmp_path, package=WantedPackage(name="lab1", paths=frozenset({"talker.py"})))
 
 
+@pytest.mark.parametrize(
+    ("beside", "path"), [({}, "labb1"), ({"lab1/CMakeLists.txt": ""}, "lab1"), (tree("lab2"), "labb1")]
+)
+def test_a_folder_of_scripts_is_not_taken_where_a_package_of_nearly_that_name_has_them(beside, path, tmp_path):
+    files = {"lab1/scripts/talker.py": "", **tree("labb1"), "labb1/scripts/talker.py": "", **beside}
+    wanted = WantedPackage(name="lab1", paths=frozenset({"talker.py"}))
+    assert opened(write(tmp_path / "repo", files), tmp_path, package=wanted).package.path == path
+
+
 def test_what_another_copy_has_and_the_graded_one_has_not_is_named(tmp_path):
     files = {**tree("src/lab1", "lab1"), "lab1/scripts/talker.py": "", "src/lab1/scripts/listener.py": ""}
     wanted = WantedPackage(name="lab1", paths=frozenset({"talker.py", "listener.py"}))
