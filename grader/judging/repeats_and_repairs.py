@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from pathlib import PurePosixPath
 from types import MappingProxyType
 from typing import NamedTuple
@@ -158,6 +158,7 @@ def apply_repaired_copy(
         )
         for c in rubric.criteria
     }
+    needs.update(dict.fromkeys(_of_own_rate(rubric, first, repairs, built, launched), ()))
     better = {c.id for c in rubric.criteria if _is_better(first, on_copy, c, needs[c.id])}
     charges = repair_charges.charge_repairs(rubric, first, better, needs)
     for criterion in rubric.criteria:
@@ -165,8 +166,7 @@ def apply_repaired_copy(
         needed = repair_charges.without_idle(needs[criterion.id], charges) or charged
         if criterion.id not in better or not needed:
             continue
-        verdict, copy = first[criterion.id], on_copy[criterion.id]
-        # The least: a criterion that needs two repairs earns no more than with the dearer one.
+        verdict, copy = first[criterion.id], on_copy[criterion.id]  # of two repairs, the dearer one counts
         share = min(rubric.share_of(one.kind) for one in needed) if criterion.points else 1.0
         told = repairs_as_handed_in(charged or needed, repairs)
         placed = with_names_as_handed_in(copy, repairs)
@@ -182,6 +182,23 @@ def apply_repaired_copy(
     return {i: _at_new_paths(v, repairs) if i in installing else v for i, v in verdicts.items()}, uses
 
 
+def _of_own_rate(
+    rubric: Rubric,
+    first: Mapping[str, Verdict],
+    repairs: Sequence[Repair],
+    built: bool,
+    launched: Launched,
+) -> Iterator[str]:
+    """Yield the criteria that have judged a rate which the copy changed: what they pass with is not the student's."""
+    rates = [one for one in repairs if one.kind == repair_charges.OF_RATES]
+    for one in (
+        c for c in rubric.criteria if c.check == "rate" and c.scenario and not first[c.id].blocked_by
+    ):
+        scenario = rubric.scenarios[str(one.scenario)]
+        if any(is_used_by(scenario, rate, rubric, built=built, launched=launched) for rate in rates):
+            yield one.id
+
+
 def _is_better(
     first: Mapping[str, Verdict],
     on_copy: Mapping[str, Verdict],
@@ -191,6 +208,12 @@ def _is_better(
     """Return whether the copy shows more of a lost criterion: no loss, a next fault, or what the machine lacks behind
     the line that is repaired."""
     verdict, copy = first[criterion.id], on_copy[criterion.id]
+    if (
+        verdict.blocked_by
+        and copy.blocked_by == verdict.blocked_by
+        and not on_copy[copy.blocked_by].blocked_by
+    ):
+        return False  # what it waits for is not repaired
     return verdict.status.is_lost and (
         not _is_worse(first, on_copy, criterion)
         or repair_charges.is_next_fault(verdict, copy, needed)

@@ -103,6 +103,14 @@ def test_a_scenario_that_the_copy_did_not_run_is_not_repeated_on_it() -> None:
     assert not judge_all_runs(rubric(*ALL), runs).doubtful_on_copy
 
 
+def test_a_rate_that_the_copy_changes_is_judged_as_it_was_handed_in() -> None:
+    slow = {**GOOD_RUN, "topics": [{"topic": "/chatter", "count": 7, "rate_hz": 1}]}
+    call = TABS.model_copy(update={"kind": "missing-call", "before": "spin", "after": "spin()"})
+    rate = TABS.model_copy(update={"kind": "loop-rate", "line": 9, "before": "Rate(1)", "after": "Rate(10)"})
+    found = judged(slow, GOOD_RUN, call, rate)["rate"]
+    assert (found.status.value, found.points, found.repaired) == ("fail", 0, None)
+
+
 @pytest.mark.parametrize("repair", [TABS, TOPIC])
 def test_one_fault_is_charged_once_where_no_criterion_requires_another(repair: Repair) -> None:
     first = DIED if repair is TABS else {**GOOD_RUN, "topics": [{"topic": "/chater", "count": 61}]}
