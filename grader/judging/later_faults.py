@@ -18,6 +18,7 @@ from grader.checks.support.parameters import absolute_name
 from grader.checks.support.scripts import CPP_SUFFIXES, SYNTAX, cmake_calls, lines_making
 from grader.checks.support.text import (
     IN_OWN_WORDS,
+    MAKE_RATE,
     SAID_DATA,
     SAID_VALUE,
     SECONDS,
@@ -51,6 +52,7 @@ ASKS = re.compile(r"[^#'\"]*\b(?:raw_)?input\s*\(")
 """A line that calls `input()`."""
 SLEEPS_FOR = re.compile(r"[^#'\"]*\brospy\.sleep\(\s*\)")
 PLAIN_NUMBER = re.compile(r"\s*(\w+)\s*=\s*[\d.]+\s*(?:#|$)")
+RATE_ASKED = re.compile(r"\brospy\.Rate\(\s*(\d+(?:\.\d+)?)\s*\)")
 MAKES_RATE = re.compile(r"\s*([\w.]+)\s*=\s*rospy\.Rate\(")
 OF_CALLBACKS = ("callback-called", "callback-values")
 OF_COUNTERS = {
@@ -341,15 +343,21 @@ class Later:
                 yield Fix(f"write `{rate}.sleep()` on line {number} of {path}: rospy.sleep() needs a time")
             plain = PLAIN_NUMBER.match(line)
             if plain and any(re.search(rf"\b{plain[1]}\.sleep\(", one) for one in lines):
-                yield Fix(
+                text = (
                     f"write `{plain[1]} = rospy.Rate({hz})` on line {number} of {path}: only a Rate can sleep"
                 )
+                yield Fix(text, general=MAKE_RATE)
         for number in loop_spins(lines):
             yield Fix(f"delete `rospy.spin()` on line {number} of {path}, at which the loop stands still")
         if not self._lacks_words("sleep") or not any(LOOPS.match(line) for line in lines):
             return
         if rate:
-            yield Fix(f"call `{rate}.sleep()` each time around the loop of {path}")
+            asked = (RATE_ASKED.search(line) for line in lines)
+            slow = next((n for n, found in enumerate(asked, 1) if found and float(found[1]) != float(hz)), 0)
+            first = f"write `{rate} = rospy.Rate({hz})` on line {slow} of {path}, and " if slow else ""
+            yield Fix(
+                f"{first}call `{rate}.sleep()` each time around the loop{'' if slow else f' of {path}'}"
+            )
         elif self._lacks_words("Timer(") and self._lacks_words(".wait("):
             made = f"`rate = rospy.Rate({hz})`"
             yield Fix(

@@ -8,6 +8,7 @@ from collections.abc import Collection, Mapping
 from pathlib import PurePath
 
 from grader.checks import Check
+from grader.checks.support.scripts import SYNTAX
 from grader.checks.support.text import texts_in
 from grader.judging.repair_charges import BUILD, is_unmade
 from grader.model.verdict import Status, Verdict, cited_lines, inconclusive
@@ -143,9 +144,9 @@ def charge_once(
     rubric: Rubric, verdicts: Mapping[str, Verdict], judged: Collection[str] = ()
 ) -> dict[str, Verdict]:
     """Return the verdicts, with those blocked that lost all of their points to what another one has lost its own to
-    already: an exception, a topic that no node hears, what the build did not make, a definition. `requires` names
-    nothing that is lost where the node goes on after it, as after one in a callback, or ends of it in another run.
-    `judged` are the criteria that a repaired copy has judged."""
+    already: an exception, a topic that no node hears, what the build did not make, a definition, a script that is not
+    there or that Python cannot read. `requires` names nothing that is lost where the node goes on after it, as after
+    one in a callback, or ends of it in another run. `judged` are the criteria that a repaired copy has judged."""
     charged, told = dict[str, str](), dict(verdicts)
     # students see the hint of the one that is charged: where the rubric asks for it, the one that asks for no exception
     for criterion in sorted(
@@ -153,9 +154,10 @@ def charge_once(
     ):
         verdict = verdicts[criterion.id]
         is_whole = verdict.status is Status.FAIL and not verdict.score and criterion.penalty is None
-        if not is_whole or criterion.scenario is None or criterion.id in judged:
+        root = _of_script(rubric, verdicts, criterion, verdict) if is_whole else ""
+        if not is_whole or (criterion.scenario is None and not root) or criterion.id in judged:
             continue
-        root = _of_files(rubric, verdicts, verdict)
+        root = root or _of_files(rubric, verdicts, verdict)
         if not root and verdict.basis.charged_once:
             root = charged.setdefault(verdict.basis.cause, criterion.id)
         if root and root != criterion.id:
@@ -168,6 +170,26 @@ def _of_files(rubric: Rubric, verdicts: Mapping[str, Verdict], verdict: Verdict)
     check = BUILD if verdict.basis.unbuilt else verdict.basis.judged_by
     lost = (c.id for c in rubric.criteria if c.check == check and verdicts[c.id].status is Status.FAIL)
     return next(lost, "")
+
+
+def _of_script(
+    rubric: Rubric, verdicts: Mapping[str, Verdict], criterion: Criterion, verdict: Verdict
+) -> str:
+    """Return the criterion that asks for a script, where this one is lost for there is no such script, or for Python
+    cannot read it; "" where there is none."""
+    own = cited_lines(verdict.citations) if any(kind in verdict.message for kind in SYNTAX) else set()
+    for other in rubric.criteria if own or verdict.basis.unjudged else ():
+        found = verdicts[other.id]
+        lacks = (
+            found.mistake.name if found.mistake is not None and found.mistake.kind == "file-missing" else ""
+        )
+        unread = other.check == "executable" and any(f": {kind}: " in found.message for kind in SYNTAX)
+        is_same = (lacks and f"there is no {lacks} to run" in verdict.message) or (
+            unread and own & cited_lines(found.citations)
+        )
+        if is_same and other.id != criterion.id and found.status is Status.FAIL:
+            return other.id
+    return ""
 
 
 def _at_root(verdict: Verdict, told: Mapping[str, Verdict]) -> Verdict:

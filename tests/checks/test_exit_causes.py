@@ -385,7 +385,7 @@ def test_a_callback_that_the_script_calls_itself_gets_no_message(tmp_path, call,
          "compare the value of each of the message's other fields"),
         ("r ^ 2 - 1.0", "TypeError: unsupported operand type(s) for ^: 'float' and 'int'", "write `r ** 2 - 1.0`"),
         ("open('/home/anna/a.csv', 'w')", "FileNotFoundError: [Errno 2] No such file or directory: '/home/anna/a.csv'",
-         "`import os`, and open `os.path.expanduser('~/a.csv')`"),
+         "open `os.path.expanduser('~/a.csv')`, with `import os` at the top"),
     ],
 )  # fmt: skip
 def test_what_is_wrong_with_messages_is_told_with_their_fields(tmp_path, source, error, hint):

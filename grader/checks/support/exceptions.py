@@ -20,7 +20,7 @@ from grader.checks.support.rospy_calls import (
     rewritten,
     uncalled_proxy,
 )
-from grader.checks.support.text import as_number, shown
+from grader.checks.support.text import MAKE_RATE, as_number, shown
 from grader.installable import noetic_messages
 from grader.model.package import PackageFacts
 from grader.model.python_slip import PythonSlip
@@ -453,9 +453,8 @@ def _attribute(message: str, source: str, _marked: tuple[int, int] | None) -> Me
     if meaning := uncalled_proxy(message, source):
         return meaning
     if found := re.match(r"'(Duration|int|float)' object has no attribute 'sleep'", message):
-        hint = "make it with `rospy.Rate(…)`, which takes how many times a second the loop runs"
         what = "a Duration is a length of time" if found[1] == "Duration" else "this is a plain number"
-        return f"{what}, and only a Rate sleeps", hint
+        return f"{what}, and only a Rate sleeps", MAKE_RATE
     if (twice := _IN_ITSELF.search(message)) and re.search(rf"\b{twice[1]}\.{twice[1]}\b", source):
         name = twice[1]
         cause = f"`from {name} import {name}` makes `{name}` what is in the module, and not the module"
@@ -488,11 +487,11 @@ def _file(message: str, source: str, _marked: tuple[int, int] | None) -> Meaning
             return "no other machine has this path", _below_home(path)
         return (
             "no other machine has this path",
-            f"keep the file beside the script, `import os`, and open `{here}`",
+            f"keep the file beside the script, and open `{here}`, with `import os` at the top",
         )
     return (
         "a path is looked for where the node is started, not beside the script",
-        f"`import os`, and open `{here}` wherever it is opened",
+        f"open `{here}` wherever it is opened, with `import os` at the top",
     )
 
 
@@ -516,7 +515,7 @@ def _is_to_write(call: ast.Call) -> bool:
 
 def _below_home(path: str) -> str:
     """Return how a file is written that the node makes itself."""
-    return f"`import os`, and open `os.path.expanduser('~/{shown(path.rpartition('/')[2])}')`"
+    return f"open `os.path.expanduser('~/{shown(path.rpartition('/')[2])}')`, with `import os` at the top"
 
 
 def _command(message: str, _source: str, _marked: tuple[int, int] | None) -> Meaning | None:
