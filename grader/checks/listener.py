@@ -219,7 +219,7 @@ def never_sent(package: PackageFacts, run: Run, topic: str) -> Verdict:
     end = explain_early_end(package, run)
     # A refused type is a cause of its own, whatever ended the node later.
     if end is not None and differing is None:
-        message = f"the node ended before it subscribed to {topic}: {end.cause}"
+        message = f"the node ended before any message was sent on {topic}: {end.cause}"
         return end.verdict(failed_or_blocked, message, measured="ended")
     verdict = differing or misfit(run, topic)
     slip = run_slip(package, run, "unregistered")

@@ -27,8 +27,8 @@ from grader.checks.support.processes import (
     slips_of,
 )
 from grader.checks.support.recorder_losses import whole_until_ns
-from grader.checks.support.scripts import fixes_of, slips_of_program
-from grader.checks.support.text import LOOP, SPIN, loop_rate, python_or_cpp, rate_hint
+from grader.checks.support.scripts import slips_of_program
+from grader.checks.support.text import LOOP, SPIN, fixes_of, loop_rate, python_or_cpp, rate_hint
 from grader.checks.support.topics import (
     SYSTEM_TOPICS,
     Sender,
@@ -339,6 +339,7 @@ def _uneven(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) 
         or _fell_silent(found, run, package, params)
         or _published_twice(found, run, package, params)
         or (_by_slip(wrong, "publish-twice", run, package, params) if mean_hz > params.high_hz else None)
+        or _by_slip(wrong, "loop-left", run, package, params, name="once")
         or _bursts(found, outside, even, params)
         or (_by_slip(wrong, "sleep-twice", run, package, params) if mean_hz < params.rate_hz else None)
         or ((slip := _asked_number(found, run, package, params)) and _with_line(wrong, slip, params))
@@ -410,8 +411,7 @@ def _asked_slow(found: Rhythm, run: Run, package: PackageFacts, params: RatePara
     slow = next((s for s in asked if found.tail_ns * float(s.message) < PAUSES_WAITED * 1e9), None)
     if slow is None or float(slow.message) >= params.low_hz:
         return None
-    count = plural(len(found.times_ns), "message")
-    seen = f"{params.topic} is too slow: {count} in {seconds(found.span_ns)}"
+    seen = f"{params.topic} is too slow: {plural(len(found.times_ns), 'message')} in {seconds(found.span_ns)}"
     return _with_line(failed(f"{seen} instead of {significant(params.rate_hz)} Hz"), slow, params)
 
 
@@ -425,16 +425,16 @@ def _published_twice(found: Rhythm, run: Run, package: PackageFacts, params: Rat
 
 
 def _by_slip(
-    verdict: Verdict, kind: SlipKind, run: Run, package: PackageFacts, params: RateParams
+    verdict: Verdict, kind: SlipKind, run: Run, package: PackageFacts, params: RateParams, *, name: str = ""
 ) -> Verdict | None:
-    """Name the line on which a publisher's loop does twice in a turn what it should do once."""
-    return _named(verdict, next(iter(_slips(run, package, params, kind)), None))
+    """Name the line on which a publisher's loop does twice in a turn what it should do once, or which lacks one."""
+    slips = _slips(run, package, params, kind)
+    return _named(verdict, next((slip for slip in slips if name in ("", slip.name)), None))
 
 
 def _named(verdict: Verdict, slip: PythonSlip | None) -> Verdict | None:
-    if slip is None:
-        return None
-    return verdict.explained(f"{slip.file}: {slip.message}", f"in {slip.file}, {slip.fix}", (slip.place,))
+    told = slip and (f"{slip.file}: {slip.message}", f"in {slip.file}, {slip.fix}", (slip.place,))
+    return verdict.explained(*told) if told else None
 
 
 def _left_out(

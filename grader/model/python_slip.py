@@ -64,7 +64,7 @@ class PythonSlip(Placed, Record):
     - `never-begun`: a loop whose condition, `name`, does not hold when the script reaches it: a `not` is missing, or a
       variable begins with the other value.
     - `loop-left`: a loop that ends in its first turn, or after a number of them, or a callback that ends the node, or
-      the only `publish(…)`, above a loop that waits or in none.
+      the only `publish(…)`, above a loop that waits or in none (`name`: `once`), or several of them in none.
     - `ends-node`: a callback that ends the node, at least sometimes, or what leaves its loop upon an exception; a slip
       only if the node ended by itself.
     - `sleep-outside`, `sleep-twice`: a loop whose `sleep()` is outside it, or whose Rate nothing sleeps by, or that

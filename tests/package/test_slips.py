@@ -249,6 +249,12 @@ CALLED = "if __name__ == '__main__':\n    main()\n"
         (OF_A + "def f():\n    m = A\n    g(m)\ndef h():\n    m = A()\n    m.x = 1\n    g(m)\n", []),
         ("p = rospy.Publisher('a', A, 10)\n", [("queue-size", 1, "is no queue size")]),
         ("p = rospy.Publisher('a', A, Listener(), queue_size=10)\n", []),
+        (node("    p.publish(1)\n    rospy.spin()\n") + CALLED,
+         [("loop-left", 4, "`rospy.Rate(...)` made above it, in place of spin() on line 5")]),
+        (node("    q = rospy.Publisher('a', A, latch=True, queue_size=1)\n    q.publish(1)\n    rospy.spin()\n")
+         + CALLED, []),
+        (node("    p.publish(1)\n    rospy.sleep(5)\n    p.publish(2)\n    rate = rospy.Rate(2)\n    rate.sleep()\n")
+         + CALLED, [("loop-left", 4, "ends with the rate's sleep()")]),
         (node("    p.publish(1)\n" + LOOP + "        rate.sleep()\n") + CALLED,
          [("loop-left", 4, "move line 4 into the loop of line 5, above line 6")]),
         (node("    p.publish(1)\n" + LOOP + "        print(str(1))\n        rate.sleep()\n") + CALLED,

@@ -253,12 +253,6 @@ def slips_of_program(argv: Sequence[str], package: PackageFacts, kind: SlipKind)
     return [slip for slip in package.slips if slip.kind == kind and slip.file in sources]
 
 
-def fixes_of(slips: Sequence[PythonSlip]) -> str:
-    """Return what to do about the first of them, and about two more of its kind and file at most."""
-    same = [s for s in slips[1:] if (s.kind, s.file) == (slips[0].kind, slips[0].file)][:2]
-    return "; ".join([slips[0].fix, *(f"on line {s.line}, {s.message}: {s.fix}" for s in same)])
-
-
 def argument_not_given(
     ended: str, argv: Sequence[str], package: PackageFacts
 ) -> tuple[str, str, tuple[FileCitation, ...]] | None:
@@ -309,9 +303,12 @@ def names_script(one: Installed, path: str) -> bool:
 
 def asks_for_wrapper(package: PackageFacts, path: str) -> bool:
     """Return whether `catkin_install_python` is to make a program of the script where `rosrun` looks: it then needs no
-    bit of its own."""
-    named = (i for i in installed(package) if i.call.name == PYTHON and i.kind == "PROGRAMS")
-    return any(names_script(i, path) and is_found(i.destination or "", package) for i in named)
+    bit of its own. A path that leads to no file stands for the script of its name."""
+    named = [i for i in installed(package) if i.call.name == PYTHON and i.kind == "PROGRAMS"]
+    named = [i for i in named if is_found(i.destination or "", package)]
+    lost = (i for i in named if posixpath.basename(i.path) == posixpath.basename(path))
+    lost = (i for i in lost if not any(names_script(i, file.path) for file in package.files))
+    return any(names_script(i, path) for i in named) or any(lost)
 
 
 def is_bin(destination: str, package: PackageFacts) -> bool:

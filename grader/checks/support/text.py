@@ -11,6 +11,7 @@ from typing import Literal
 
 from pydantic import AfterValidator
 
+from grader.model.python_slip import PythonSlip
 from grader.untrusted_text import visible, without_colours
 from grader.wording import is_one_edit, join_words, plural, shorten
 
@@ -210,6 +211,7 @@ def in_language(hint: str, language: Language | None) -> str:
 
 LOOP = python_or_cpp("while not rospy.is_shutdown():", "while (ros::ok())")
 SPIN = python_or_cpp("rospy.spin()", "ros::spin()")
+MAKE_RATE = "make it with `rospy.Rate(…)`, which takes how many times a second the loop runs"
 STAY_ALIVE = f"a node has to stay alive: `{SPIN}`, or a loop `{LOOP}`"
 INIT = python_or_cpp("rospy.init_node(…)", "ros::init(argc, argv, …) and ros::NodeHandle")
 RATE = python_or_cpp("rospy.Rate", "ros::Rate")
@@ -479,3 +481,9 @@ CAUSES = {
     "TabError": ("tabs and spaces are mixed in its indentation", "indent every line with four spaces"),
 }  # fmt: skip
 """What an exception of this type means, and what to do, where nothing better is known."""
+
+
+def fixes_of(slips: Sequence[PythonSlip]) -> str:
+    """Return what to do about the first of them, and about two more of its kind and file at most."""
+    same = [s for s in slips[1:] if (s.kind, s.file) == (slips[0].kind, slips[0].file)][:2]
+    return "; ".join([slips[0].fix, *(f"on line {s.line}, {s.message}: {s.fix}" for s in same)])

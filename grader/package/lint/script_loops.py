@@ -197,18 +197,39 @@ def waits_without_not(tree):
 
 
 def lacking_loops(tree):
-    """One `publish` and, below it, one `sleep` of a rate, in a script that has no loop and nothing else that waits."""
-    waits = ("spin", "Subscriber", "Timer", "Service", "SimpleActionServer", "run", "start")
-    if any(all_of(tree, *LOOPS)) or calls_in(tree, *waits) or not calls_in(tree, "Rate"):
+    """What publishes once, or a few times, above the sleep of a rate or a `spin()`, in a script that has no loop and
+    nothing else that waits."""
+    waits = ("Subscriber", "Timer", "Service", "SimpleActionServer", "run", "start")
+    latched = any(one.arg == "latch" for one in all_of(tree, ast.keyword))
+    if any(all_of(tree, *LOOPS)) or calls_in(tree, *waits) or latched:
         return
     for body in [getattr(node, "body", None) for node in ast.walk(tree)]:
         alone = [one for one in body if isinstance(one, ast.Expr)] if isinstance(body, list) else []
-        sent = [one.lineno for one in alone if is_call(one.value, "publish")]
-        slept = [one.lineno for one in alone if is_call(one.value, "sleep")]
-        if len(sent) == len(slept) == 1 and sent < slept:
+        sent, slept, spun = (
+            [one.lineno for one in alone if is_call(one.value, name)] for name in ("publish", "sleep", "spin")
+        )
+        last = (spun or (slept if calls_in(tree, "Rate") and not calls_in(tree, "spin") else [0]))[-1:]
+        if not sent or [sent[0]] >= last:
+            continue
+        message = "no loop is around line %d, so it publishes once" % sent[0]
+        if len(sent) > 1:
+            message = "no loop is around lines %d to %d, so they publish %d messages" % (
+                sent[0],
+                sent[-1],
+                len(sent),
+            )
+        wait = (
+            "the rate's sleep()"
+            if calls_in(tree, "Rate")
+            else "the sleep() of a `rospy.Rate(...)` made above it"
+        )
+        fix = "publish in a loop `while not rospy.is_shutdown():` that ends with " + wait
+        if spun:
+            fix += ", in place of spin() on line %d" % spun[-1]
+        elif len(sent) == len(slept) == 1:
             fix = "write `while not rospy.is_shutdown():` above line %d, and begin lines %d to %d with four more spaces"
-            message = "no loop is around line %d, so it publishes once" % sent[0]
-            yield slip(sent[0], "loop-left", message, fix % (sent[0], sent[0], slept[0]))
+            fix %= (sent[0], sent[0], slept[0])
+        yield slip(sent[0], "loop-left", message, fix, "once")
 
 
 def end_of_rounds(loop):
