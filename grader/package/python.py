@@ -107,7 +107,9 @@ _MESSAGES: tuple[tuple[str, ...], ...] = (
     (r"f-string: expecting '}'", "a `{` in the f-string is never closed", "write `}` after its value"),
     (r"expected 'except' or 'finally'",
      "a `try:` has no `except` below it", "write `except` there, with the error that it catches, and its block"),
-    (r"future feature|__future__ imports must", "Python 3 needs nothing from `__future__`", DELETE_LINE),
+    (r"future feature (\w+) is not", "`__future__` has no `{0}`, and Python 3 needs nothing from it", DELETE_LINE),
+    (r"__future__ imports must",
+     "`from __future__` may only be the first statement, and Python 3 needs nothing from it", DELETE_LINE),
     (r"non-default argument|parameter without a default",
      "a parameter without a default comes behind one with a default", "move it before that one"),
     (r"no binding for nonlocal '(\w+)'", "no function around this one has a variable {0}",
@@ -375,7 +377,7 @@ def _reason_of_block(message: str, text: str, *, mixed: bool) -> Reason | None:
     number = told[2] if told else empty[1] if (empty := _EMPTY_BLOCK.match(message)) else ""
     if number and _EXCEPT.match(text) and not message.startswith("only"):
         return Reason(f"there is nothing in the block on line {number}", f"below line {number}, write `pass`")
-    if number and (told or (_NEXT_BLOCK.match(text) and "class" not in message)):
+    if number and (told or not text.strip() or (_NEXT_BLOCK.match(text) and "class" not in message)):
         found = "are only comments" if message.startswith("only") else "is nothing"
         return Reason(
             f"there {found} in the block on line {number}", f"below line {number}, write what it should do"

@@ -129,6 +129,12 @@ CASES = {
          **swapped(LAUNCHED, ("talker.py", "talker.cpp"))}, ["launch-type"],
         'type="talker.cpp" should be type="talker"', wanted=asking(scripts=("talker",)),
     ),
+    "type-source-beside-the-labs-script": Case(
+        {"src/talker.cpp": "int main() {}\n",
+         CMAKELISTS: f"{CMAKE}add_executable(talker src/talker.cpp)\ntarget_link_libraries(talker x)\n",
+         **swapped(LAUNCHED, ("talker.py", "talker.cpp"))}, ["launch-type"],
+        'type="talker.cpp" should be type="talker.py"', wanted=asking(started=(("lab.launch", "talker.py"),)),
+    ),
     "tag-open": Case(swapped(LAUNCHED, ("/>", ">")), ["launch-syntax"], "is still open where"),
     "no-quotes": Case(swapped(LAUNCHED, ('"talker.py"', "talker.py")), ["launch-syntax"], "has no quotes around it"),
     "script-of-a-launch-file-that-cannot-be-read": Case(

@@ -217,10 +217,14 @@ CASES = {
                         ("    rate =", "    rospy.Service('t', Turn, turn_server)\n    rate =")), [],
     ),
     "no-such-future": Case(swapped(TALKER, ("import rospy", "from __future__ import print_functions\nimport rospy")),
-        ["python-syntax"], "needs nothing from `__future__`"),
+        ["python-syntax"], "`__future__` has no `print_functions`, and Python 3 needs nothing from it"),
+    "function-without-a-body-at-the-end": Case({TALKER: f"{SCRIPT}\n\ndef wall():\n"},
+        ["python-syntax"], "write what it should do, or `pass` if nothing"),
+    "function-without-a-body-above-another": Case(swapped(TALKER, ("def main():", "def wall():\n\n\ndef main():")),
+        ["python-syntax"], "write what it should do, or `pass` if nothing"),
     "future-after-others": Case(
         swapped(TALKER, ("import rospy", "import rospy\nfrom __future__ import division, print_function  # 2")),
-        ["python-syntax"], "needs nothing from `__future__`"),
+        ["python-syntax"], "may only be the first statement, and Python 3 needs nothing from it"),
     "colon": Case(swapped(TALKER, ("is_shutdown():", "is_shutdown()")), ["python-syntax"], "line 9"),
     "bracket": Case(swapped(TALKER, ("queue_size=10)", "queue_size=10")), ["python-syntax"], "never closed"),
     "quote": Case(swapped(TALKER, ("'talker')", "'talker)")), ["python-syntax"], "line 6 of src/talker.py: a quote"),
@@ -230,7 +234,7 @@ CASES = {
     "no-such-future-above-a-print-with-brackets": Case(
         swapped(TALKER, ("import rospy\n", "from __future__ import print_functions\nimport rospy\n"),
                 ("    rospy.init", "    print('print it: %s' % 1)\n    rospy.init")),
-        ["python-syntax"], "line 2 of src/talker.py: Python 3 needs nothing",
+        ["python-syntax"], "line 2 of src/talker.py: `__future__` has no `print_functions`",
     ),
     "future-behind-imports": Case(
         swapped(TALKER, ("import rospy\n", "import rospy\nfrom __future__ import print_function\n")),

@@ -92,9 +92,13 @@ def with_head(lines, at):
 
 
 def lacks_body(head, line):
-    """Return whether the body of an `if` is missing where a line that belongs to the loop around it follows."""
+    """Return whether the body of an `if` is missing where a line that belongs to the loop around it follows, or that of
+    a function where the next one does."""
     of_if = re.match(r"\s*(if|elif|else)\b", head)
-    return bool(of_if and width_of(head) == width_of(line) and PAUSES.match(line))
+    of_function = re.match(r"\s*(async\s+)?def\b", head) and re.match(
+        r"\s*(@|def\b|class\b|if __name__)", line
+    )
+    return width_of(head) == width_of(line) and bool((of_if and PAUSES.match(line)) or of_function)
 
 
 def first_version(text, left_out="|="):

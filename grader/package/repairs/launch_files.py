@@ -71,7 +71,9 @@ def repair_launch_names(files: Files, package: PackageFacts, names: Sequence[str
             and (node.pkg in ours or is_near(node.pkg or "", own))
         ):
             plain = PurePosixPath(kind).name
-            there = [one for one in (f"{kind}.py", plain, f"{plain}.py") if one in scripts]
+            asked = {name for file, name in wanted.started if file == PurePosixPath(launch.path).name}
+            of_source = {f"{PurePosixPath(plain).stem}.py"} & asked if plain.endswith(CPP) else ()
+            there = [one for one in (f"{kind}.py", plain, f"{plain}.py", *of_source) if one in scripts]
             there = there or [one for one, sources in made.items() if _is_among(plain, sources)]
             near = there or [s for s in sorted(programs) if is_near(kind, s)]
             for right in near[:1]:

@@ -497,7 +497,7 @@ WORDS: dict[Cause, tuple[str, str]] = {
     "argument": ("{place}: {word}", ""),
     "guard": ("{place}: {word}", ""),
     "line": ("{place}: the line `{word}` is missing", ""),
-    "empty": ("{place}: this block needs a line of its own", "write there what it should do, or `pass` if nothing"),
+    "empty": ("{place}: this block needs a line of its own", "write what it should do, or `pass` if nothing"),
     "emptied": ("{place}: there are only comments in the block that begins above it",
      "delete the `#` before the code of that block"),
     "twice": ("{place}: this line repeats the one above", "delete line {line}"),
