@@ -100,7 +100,9 @@ def _choose(candidates: list[Candidate], wanted: WantedPackage) -> Choice | None
     made = [c for c in bare if c.has_cmake]
     # A folder of scripts is no package where one with the lab's files is beside it.
     if bare and (made or not any(_files_of(c.folder, wanted.files) for c in near)):
-        return _best(made or bare, wanted)  # A workspace has `src/` too; the package in it has the CMakeLists.txt.
+        return _best(
+            made or bare, wanted
+        )  # A workspace has `src/` too; the package in it has the CMakeLists.txt.
     return _best(near, wanted) if near else None
 
 

@@ -270,7 +270,9 @@ def test_a_folder_of_another_package_is_not_taken_for_it_either(tmp_path):
 @pytest.mark.parametrize(
     ("beside", "path"), [({}, "labb1"), ({"lab1/CMakeLists.txt": ""}, "lab1"), (tree("lab2"), "labb1")]
 )
-def test_a_folder_of_scripts_is_not_taken_where_a_package_of_nearly_that_name_has_them(beside, path, tmp_path):
+def test_a_folder_of_scripts_is_not_taken_where_a_package_of_nearly_that_name_has_them(
+    beside, path, tmp_path
+):
     files = {"lab1/scripts/talker.py": "", **tree("labb1"), "labb1/scripts/talker.py": "", **beside}
     wanted = WantedPackage(name="lab1", paths=frozenset({"talker.py"}))
     assert opened(write(tmp_path / "repo", files), tmp_path, package=wanted).package.path == path
