@@ -424,7 +424,7 @@ def ended_by_itself(
         talks = any(c.messages for c in run.student_channels() if c.callerid in names)
         alive = f"publish in a loop `{LOOP}`" if talks else f"end with {SPIN}"
         verdict = failed(message, hint=f"keep it alive: {alive}", citations=cited)
-    if left is not None and left.kind == "never-begun":
+    if left is not None and (left.kind == "never-begun" or left.name == "once"):
         return verdict.if_repeated()  # it ends as soon on any machine
     # on a quicker machine, the others may connect to it before it ends
     return excused(verdict.if_repeated(), run, run.start_ns, run.end_ns, why_late)
