@@ -318,7 +318,10 @@ def _by_what_is_heard(run: Run, message: str, of_node: Callable[..., Verdict]) -
             measured="no message",
             hint=hint,
         )
-    hint = f"call publish(…) inside the loop `{LOOP}`"
+    hint, fed = f"call publish(…) inside the loop `{LOOP}`", topics_with(run, "publishers", lambda _: True)
+    if silent := [one for one in topics_with(run, "subscribers") if one not in {*fed, *SYSTEM_TOPICS}]:
+        message += f": it hears {join_words(silent)}, and nothing is sent there in this run"
+        hint = f"publish in a loop `{LOOP}`: a callback is called only when a message comes"
     return of_node(message, measured="no message", hint=hint)
 
 
