@@ -24,7 +24,7 @@ from grader.checks.support.scripts import PYTHON, copies_of, find_script, instal
 from grader.evidence.events import CATKIN_MAKE, PACKAGE_RUN
 from grader.evidence.run import Run
 from grader.judging import repair_charges
-from grader.model.package import PackageFacts
+from grader.model.package import MANIFEST, PackageFacts
 from grader.model.repair import OF_LOGIC, RENAMED, Repair
 from grader.model.result import CriterionResult, Repaired
 from grader.model.verdict import FileCitation, Status, Verdict, cited_lines
@@ -285,7 +285,8 @@ def concerns(
     if repair.kind in repair_charges.OF_BUILDS and (
         criterion.check == repair_charges.BUILD or repair_charges.is_unmade(found[criterion.id])
     ):
-        return not builds or not (repair.kind == "manifest-line" or _only_installs(repair))
+        idle = repair.kind == "manifest-line" and (builds or not _is_of_manifest(found[criterion.id], repair))
+        return not idle and (not builds or not _only_installs(repair))
     seen = f"{found[criterion.id].message} {found[criterion.id].measured}"
     if repair.kind == "file-name" and PurePosixPath(repair.before).name in seen:
         return True
@@ -316,9 +317,20 @@ def _is_of_words(repair: Repair) -> bool:
     return no_f or (prints and told == right) or repair.before.replace("+", "%", 1) == repair.after
 
 
+def _added(repair: Repair) -> str:
+    return "\n".join({*repair.after.split("\n")} - {*repair.before.split("\n")})
+
+
 def _only_installs(repair: Repair) -> bool:
-    added = "\n".join({*repair.after.split("\n")} - {*repair.before.split("\n")})
-    return INSTALLING.search(added) is not None and not GENERATION.search(added)
+    return INSTALLING.search(_added(repair)) is not None and not GENERATION.search(_added(repair))
+
+
+def _is_of_manifest(found: Verdict | CriterionResult, repair: Repair) -> bool:
+    """Return whether a build may have failed for want of the line: it says so, or names what the line does. For a
+    package that is needed to run alone, CMake asks for none."""
+    names = re.findall(r">\s*([\w-]+)\s*<", _added(repair))
+    named = any(re.search(rf"\b{re.escape(name)}\b", found.message) for name in (*names, MANIFEST))
+    return not names or named or repair_charges.cites_file(found, repair)
 
 
 Launched = Mapping[str, Collection[str]]

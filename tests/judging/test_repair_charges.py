@@ -10,6 +10,7 @@ import pytest
 from grader.judging import judge
 from grader.judging.judge import judge_all_runs
 from grader.judging.repair_charges import charged_verdict
+from grader.judging.repeats_and_repairs import concerns
 from grader.model.repair import Repair
 from grader.model.result import CriterionResult
 from grader.model.verdict import FileCitation, failed, passed
@@ -109,6 +110,24 @@ def test_a_rate_that_the_copy_changes_is_judged_as_it_was_handed_in() -> None:
     rate = TABS.model_copy(update={"kind": "loop-rate", "line": 9, "before": "Rate(1)", "after": "Rate(10)"})
     found = judged(slow, GOOD_RUN, call, rate)["rate"]
     assert (found.status.value, found.points, found.repaired) == ("fail", 0, None)
+
+
+@pytest.mark.parametrize(
+    ("message", "needed"),
+    [
+        ("catkin_make failed: CMakeLists.txt:9: catkin_install_python(…) names node.py", False),
+        ("catkin_make failed: Could not find a package configuration file provided by robot_msgs", True),
+        ("catkin_make failed: package.xml:4: mismatched tag", True),
+    ],
+)
+def test_a_build_needs_a_dependency_only_if_it_fails_for_want_of_it(message: str, *, needed: bool) -> None:
+    before = "  <exec_depend>rospy</exec_depend>"
+    update = {"kind": "manifest-line", "file": "package.xml", "before": before}
+    line = TABS.model_copy(update={**update, "after": f"{before}\n  <depend>robot_msgs</depend>"})
+    lab = rubric({"id": "build", "title": "It builds", "points": 5, "check": "build"}, *ALL)
+    found = {c.id: failed(message, hint="look") for c in lab.criteria}
+    criterion = next(c for c in lab.criteria if c.id == "build")
+    assert concerns(line, criterion, lab, found, built=False, launched={}) is needed
 
 
 @pytest.mark.parametrize("repair", [TABS, TOPIC])
