@@ -263,6 +263,15 @@ def test_the_hint_is_the_line_as_it_should_be(tmp_path, line, source, error, hin
     assert explained(tmp_path, {"src/talker.py": SCRIPT}, frame, error=error).hint == hint
 
 
+def test_a_second_node_of_a_script_is_not_told_to_come_first(tmp_path):
+    text = "import rospy\ndef hear():\n    rospy.init_node('hear')\nrospy.init_node('talker')\nhear()\n"
+    said = "rospy.init_node() has already been called with different arguments: ('talker', [])"
+    frame, error = ("talker.py", 4, "rospy.init_node('hear')"), f"rospy.exceptions.ROSException: {said}"
+    end = explained(tmp_path, {"talker.py": text}, frame, error=error)
+    assert "is called a second time" in end.cause
+    assert end.hint == "one script is one node: call `rospy.init_node(…)` once"
+
+
 @pytest.mark.parametrize(("first", "line"), [("", 3), ("#!/usr/bin/env python3\n", 4)])
 def test_a_line_is_counted_without_the_first_line_that_the_arena_writes(tmp_path, first, line):
     files = {"talker.py": f"{first}import rospy\nrospy.init_node('talker')\nrospu.spin()\n"}

@@ -431,7 +431,8 @@ def _by_other_lines(found: Traceback, place: FileCitation, package: PackageFacts
         return no_number(found, place, package)
     if slip := next((name for said, name in OF_OTHER_LINES.items() if said in found.message), ""):
         return next(((s.message, s.fix) for s in own if slip in {s.kind, s.name}), None)
-    late = found.kind in {"ROSInitException", "ROSException"} and "init_node" in found.message
+    told = found.message.rpartition("already been called")[2]  # a second call comes too late, not too early
+    late = found.kind in {"ROSInitException", "ROSException"} and "init_node" in told
     calls = [f.line for f in found.own_frames if path_in_package(package, f.file) == place.file] or [1]
     return _late_init(place.file, calls, package) if late else explain_narrow_handler(found, place, package)
 
