@@ -377,7 +377,7 @@ def _reason_of_block(message: str, text: str, *, mixed: bool) -> Reason | None:
     number = told[2] if told else empty[1] if (empty := _EMPTY_BLOCK.match(message)) else ""
     if number and _EXCEPT.match(text) and not message.startswith("only"):
         return Reason(f"there is nothing in the block on line {number}", f"below line {number}, write `pass`")
-    if number and (told or not text.strip() or (_NEXT_BLOCK.match(text) and "class" not in message)):
+    if number and (told or (_NEXT_BLOCK.match(text) and "class" not in message)):
         found = "are only comments" if message.startswith("only") else "is nothing"
         return Reason(
             f"there {found} in the block on line {number}", f"below line {number}, write what it should do"

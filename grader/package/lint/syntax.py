@@ -437,7 +437,8 @@ def block_fault(lines, line, message):
         is_out = is_out and lines[line - 1].partition("#")[0].strip() != "pass"  # it can only be the body
         told = "the same line twice" if lines[line - 1].strip() == lines[head].strip() else ""
         told = "no indentation in the text" if has_no_indentation(lines) else told
-        if not told and (is_out or lacks_body(lines[head], lines[line - 1])):
+        at_end = not any(map(is_code, lines[line - 1 :]))
+        if not told and (is_out or at_end or lacks_body(lines[head], lines[line - 1])):
             told = "nothing in the block on line %d" % (head + 1)
         if told:
             return fault("IndentationError", line, 1, told, text=lines[line - 1])
