@@ -21,7 +21,7 @@ from grader.package.python_repairs.lost_heads import lost_head_at
 ODD_LINES_MAX = 3
 USUAL_DEPTH = 4
 OUTERMOST = re.compile(r"(import|from)\s|if\s+__name__\b")
-EMPTY_EXCEPT = re.compile(r"expected an indented block after 'except' statement on line (\d+)")
+HEAD_TOLD = re.compile(r"expected an indented block after .* on line (\d+)")
 OUTER = re.compile(r"(def|class)\s|@|if\s+__name__\b")
 """What is seldom within a block."""
 DEFINES = re.compile(r"(def|class)\s")
@@ -83,7 +83,7 @@ def in_their_blocks(lines: list[str], at: int, message: str) -> Iterator[tuple[s
     if message.startswith(("expected an indented block", "unindent does not match")):
         yield from (("turned", candidate) for candidate in _with_loop_below(lines, at))
         yield from (("indent", candidate) for candidate in _with_body_indented(lines, at))
-        yield from (("empty", candidate) for candidate in _with_a_body(lines, at))
+        yield from (("empty", candidate) for candidate in _with_a_body(lines, at, message))
     if message.startswith("expected 'except' or 'finally'"):
         yield from (("level", candidate) for candidate in _with_lines_in_try(lines, at))
     if message.startswith(("unexpected indent", "unindent does not match")):
@@ -111,7 +111,7 @@ def _with_head_further_out(lines: list[str], at: int) -> Iterator[str]:
 
 def with_body_uncommented(lines: list[str], message: str) -> Iterator[tuple[str, str]]:
     """Yield the cause and the text with the comments below a block's first line as its body, where they are code."""
-    found = re.match(r"expected an indented block after .* on line (\d+)", message)
+    found = HEAD_TOLD.match(message)
     head = int(found[1]) if found else 0
     body = list(takewhile(lambda line: line.lstrip().startswith("#"), lines[head:]))
     after = next((line for line in lines[head + len(body) :] if without_texts(line).strip()), "")
@@ -159,14 +159,16 @@ def _with_loop_below(lines: list[str], at: int) -> Iterator[str]:
         yield "\n".join([*lines[: at - 1], lines[at], head, *lines[at + 1 :]])
 
 
-def _with_a_body(lines: list[str], at: int) -> Iterator[str]:
+def _with_a_body(lines: list[str], at: int, message: str) -> Iterator[str]:
     """Yield the text with a `pass` in the block above the line, which begins further out than that block's head, or
-    belongs to the loop around it."""
-    above = next((n for n in range(at - 1, -1, -1) if without_texts(lines[n]).strip()), at)
+    belongs to no such block; or at the end of the text."""
+    code, told = [n for n, line in enumerate(lines) if without_texts(line).strip()], HEAD_TOLD.match(message)
+    above = int(told[1]) - 1 if told else next((n for n in reversed(code) if n < at), at)
     head = lines[above]
     is_outer = OUTER.match(lines[at].strip()) and _width(lines[at]) == _width(head)
     is_out = is_outer or _width(lines[at]) < _width(head) or lacks_body(head, lines[at])
-    if is_out and not head.lstrip().startswith("while"):
+    is_last = above == code[-1] and DEFINES.match(head.strip())
+    if (is_out or is_last) and not head.lstrip().startswith(("while", "except")):
         candidate = "\n".join([*lines[: above + 1], f"{_indentation(head)}    pass", *lines[above + 1 :]])
         if is_right(lines, at, candidate):
             yield candidate
@@ -201,7 +203,7 @@ def _with_import(lines: list[str], at: int) -> str:
 
 def _with_line_back(lines: list[str], at: int, message: str) -> Iterator[str]:
     """Yield the text with a line that its block cannot do without: `try:`, `except …:`, `pass` or `def …:`."""
-    if empty := EMPTY_EXCEPT.match(message):
+    if "'except'" in message and (empty := HEAD_TOLD.match(message)):
         head = int(empty[1])
         yield "\n".join([*lines[:head], f"{_indentation(lines[head - 1])}    pass", *lines[head:]])
     elif message.startswith("expected 'except' or 'finally'"):

@@ -54,8 +54,8 @@ ROSPY_COMMA = re.compile(r"(?<![\w.])rospy\s*[,;:]\s*(?=[A-Za-z]\w*\s*[(:])")
 FUTURE = re.compile(r"\s*from\s+__future__\s+import\s+[\w \t,]+(#.*)?")
 KNOWN_WORDS = {
     *keyword.kwlist, *dir(builtins), *"bfru", "rospy", "data", "msg", "srv", "std_msgs", "String", "init_node",
-    "anonymous", "Publisher", "publish", "queue_size", "Subscriber", "spin", "Rate", "sleep", "is_shutdown", "get_time", "loginfo",
-    "get_caller_id", "get_name", "get_param", "Service", "ServiceProxy", "Timer", "Duration", "ROSInterruptException",
+    "anonymous", "Publisher", "publish", "queue_size", "Subscriber", "spin", "Rate", "sleep", "is_shutdown", "get_time",
+    "loginfo", "get_caller_id", "get_name", "get_param", "Service", "ServiceProxy", "Timer", "Duration", "ROSInterruptException",
 }  # fmt: skip
 """Python's, and what most nodes use."""
 Step = dict[str, Any]
@@ -116,7 +116,7 @@ def _step(cause: str, text: str, candidate: str, error: Error) -> Step:
 
 
 def _first_changed(before: str, after: str) -> int:
-    pairs = zip(before.split("\n"), after.split("\n"), strict=False)
+    pairs = zip([*before.split("\n"), None], after.split("\n"), strict=False)
     return next((number for number, (old, new) in enumerate(pairs, start=1) if old != new), 1)
 
 
