@@ -36,12 +36,12 @@ from grader.model.verdict import FileCitation
 from grader.package.manifest import parse_manifest
 from grader.package.repairs import NotRepairable, apply_repair, find_repairs, wanted_of
 from grader.package.repairs.editing import read_data
-from grader.package.repairs.of_runs import other_field, repairs_by_hint
+from grader.package.repairs.of_runs import other_field, other_item, repairs_by_hint
 from grader.package.repairs.python import ros_clock, turn_sign
 from grader.rubric.model import Rubric
-from grader.wording import fields_told
+from grader.wording import ASKED_ITEM, fields_told
 
-STEERS_WRONG, WARPED = "steers-wrong", "warped"
+STEERS_WRONG, WARPED, OWN = "steers-wrong", "warped", "student"
 REPAIRS_MAX = 4
 """So many lines of each script and launch file are repaired, however many mistakes are on one."""
 
@@ -67,7 +67,7 @@ def choose_repairs(
     if not lost and not blocked:
         return (), ()
     found = _find_in_all(submission, facts, rubric)
-    found += _of_errors(submission, criteria, found)
+    found += _of_errors(submission, rubric, criteria, found)
     # an `input()` waits for ever in a run in which nothing is typed
     typed = any(scenario.typed_to for scenario in rubric.scenarios.values())
     counting = [one for one in found if rubric.share_of(one.kind) > 0 and (typed or not one.asks_input)]
@@ -99,11 +99,16 @@ def choose_repairs(
 
 
 def _of_errors(
-    submission: Submission, criteria: Sequence[CriterionResult], found: Collection[Repair]
+    submission: Submission, rubric: Rubric, criteria: Sequence[CriterionResult], found: Collection[Repair]
 ) -> Iterator[Repair]:
-    """Yield the repairs of what only a run shows: of a value's or a topic's type, or of a loop's rate."""
+    """Yield the repairs of what only a run shows: of a value's or a topic's type, or of a loop's rate. A topic's type
+    matters to other criteria where a program of the course's should have heard it."""
+    lost = {one.id for one in criteria if one.status.is_lost}
+    of_others = {c.scenario for c in rubric.criteria if c.id in lost and c.parameters.get("of", OWN) != OWN}
     known = {(one.file, one.line) for one in found}
     for criterion in (one for one in criteria if one.status.is_lost and not one.blocked_by):
+        if criterion.check == "topic-type" and criterion.scenario not in of_others:
+            continue
         cited = next((one for one in criterion.citations if isinstance(one, FileCitation)), None)
         if cited is None or cited.line is None or cited.file.startswith("../"):
             continue
@@ -121,6 +126,8 @@ def _choose_logic(
     turning = {c.scenario: c.mistake.name for c in criteria if c.mistake and c.mistake.kind == STEERS_WRONG}
     led = {c.scenario for c in criteria if c.check in OF_WAYS and c.status.is_lost and not c.blocked_by}
     fields = {c.scenario: told for c in criteria if c.status.is_lost and (told := fields_told(c.hint))}
+    asked = ((c.scenario, ASKED_ITEM.search(c.hint)) for c in criteria if c.status.is_lost)
+    items = {scenario: (found[1], found[2]) for scenario, found in asked if found is not None}
     folder, scripts = submission.package.folder, dict[str, str]()
     for name in sorted(lost) if not submission.also else ():
         if len(own := [start.script for start in rubric.scenarios[name].start if start.script]) == 1:
@@ -130,6 +137,7 @@ def _choose_logic(
         (turn_sign(folder, scripts[name], turning[name]) for name in scripts if name in turning),
         (ros_clock(folder, scripts[name]) for name in warped),
         (other_field(folder, scripts[name], *fields[name]) for name in scripts if name in fields),
+        (other_item(folder, scripts[name], *items[name]) for name in scripts if name in items),
         (turn_sign(folder, scripts[name]) for name in scripts if name in led),
     )
     for found in filter(None, possible):

@@ -252,6 +252,10 @@ ASKED_TYPE = re.compile(r"use (\w+)/(\w+), the type that the handout asks for")
 """The package and the name in a hint of `ask_type`."""
 
 
+PUBLISHED_TYPE = re.compile(r"from (std_msgs)\.msg import (\w+), then rospy\.Publisher\('[^']+', \2,")
+"""The package and the name in the hint on a publisher of another type."""
+
+
 def ask_field(field: str, other: str, value: str = "") -> str:
     """Return the hint on a field that another one has the values of: `set linear.x to 0.2, not linear.y`."""
     return f"set {field} to {value}, not {other}" if value else f"set {field}, not {other}"
@@ -268,6 +272,16 @@ def fields_told(hint: str) -> tuple[str, str] | None:
         return found[1], found[2]
     found = re.search(r"\bis ([\w.]+) set in place of ([\w.]+)\?", hint)
     return (found[2], found[1]) if found is not None else None
+
+
+def ask_item(field: str, topic: str, right: str, wrong: str) -> str:
+    """Return the hint on a field that is made of another part of what comes: `for linear.x, use axes[1] of /joy, not
+    axes[3]`."""
+    return f"for {field}, use {right} of {topic}, not {wrong}"
+
+
+ASKED_ITEM = re.compile(r"for [\w.]+, use (\S+) of /\S+, not ([^\s;]+)")
+"""The part that is right, and the other one, in a hint of `ask_item`."""
 
 
 SWAPPED = re.compile(r"on line (\d+), swap the two values in the brackets of `(\w+)`")

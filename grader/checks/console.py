@@ -94,7 +94,9 @@ class PrintsParams(Record):
         """The text with its numbers in their places."""
         text = self.text
         for number in self.numbers:
-            text = text.replace(PLACE, significant(number), 1)
+            plain = significant(number)
+            is_exact = abs(float(plain) - number) <= self.tolerance
+            text = text.replace(PLACE, plain if is_exact else f"{number:.10g}", 1)
         return repr(text.replace(PLACE, "<number>"))
 
     @property
@@ -182,11 +184,12 @@ def _not_printed(
     absent = [name for name, is_there in asked.items() if not is_there and name not in offered_services(run)]
     lacking = absent[0] if absent and not one.ended_early else ""
     never = f"it never prints {params.words}"
-    # Where the call failed or the program crashed, a number on a line need not be an answer.
+    # After a failed call or a crash, a number on a line need not be an answer.
     if other and not (lacking or (failing and params.is_number_alone)):
         near = f", within {significant(params.tolerance)}" if params.tolerance else ""
         message = f"it prints {shown(other[0].text)!r}, not {params.words}{near}{_slip(other[0], params)}"
-        return _of_client(asked, run)(message, hint=hint).about(said=other[0].text)
+        lost = _of_client(asked, run)(message, hint=hint).about(said=other[0].text)
+        return lost.based_on(lost_to=(f"{params.text}: cut off",)) if _is_cut(other[0], params) else lost
     if failing:
         end, ended = explain_end(one, run, package), f"it ended before it printed {params.words}"
         early = _called_early(one, asked, run)
@@ -218,8 +221,21 @@ def _not_printed(
     # what comes with an answer cannot be printed where nothing was called
     kind = failed_or_blocked if params.numbers and _uncalled(asked, run) else _of_client(asked, run)
     lost = kind(f"{never}; it prints {shown(meant.text)!r}", hint=hint)
-    lost = lost.about(said=meant.text).if_repeated()
+    lost = lost.about(said=meant.text).based_on(lost_to=_other_words(meant, params)).if_repeated()
     return lost.late() if waits else lost
+
+
+def _other_words(line: Line, params: PrintsParams) -> tuple[str, ...]:
+    """Return what is wrong where the right numbers are on a line, with other words, for all criteria on that text."""
+    there = [float(text) for text in re.findall(NUMBER, line.text[:LINE_CHARS_MAX])]
+    near = (any(abs(one - n) <= params.tolerance + ROUNDING for one in there) for n in params.numbers)
+    return (f"{params.text}: in other words",) if params.numbers and all(near) else ()
+
+
+def _is_cut(line: Line, params: PrintsParams) -> bool:
+    """Return whether the numbers on a line are the right ones without their decimals."""
+    cut = tuple(float(int(n)) for n in params.numbers)
+    return cut != params.numbers and _fits(line, params.model_copy(update={"numbers": cut, "tolerance": 0.0}))
 
 
 def _uncalled(asked: Collection[str], run: Run) -> bool:

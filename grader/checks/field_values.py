@@ -23,6 +23,7 @@ from grader.checks.support.fields import (
     bounds_text,
     differences,
     has_hole,
+    is_number,
     is_within,
     join_items,
     made_of,
@@ -32,6 +33,7 @@ from grader.checks.support.fields import (
     readings,
     refuse_disorder,
     set_beside,
+    taken_from,
     turned_wrong,
     value_text,
     was_right,
@@ -52,7 +54,7 @@ from grader.model.verdict import (
     grade_again,
     passed,
 )
-from grader.wording import LISTED_MAX, join_words, plural, significant, suspect_field
+from grader.wording import LISTED_MAX, ask_item, join_words, plural, significant, suspect_field
 
 VALUES_SHOWN = 4
 
@@ -153,6 +155,11 @@ def _outside(
         f"{params.field} of {params.topic} is not {params.words} {count}: it {seen}, {after} after the first"
     )
     verdict = failed(message, hint=f"make sure that {params.field} is {params.words} before you publish it")
+    beyond = [beyond_words(params, side, end) for side, end in (("below", params.min), ("above", params.max))]
+    numbers = [value for one in outside for value in one.values]
+    if numbers and all(params.holds(-value) for value in numbers):
+        beyond = [*beyond, beyond_words(params, OTHER_SIGN)]
+    verdict = verdict.based_on(lost_to=(*beyond,))
     return _of_nan(verdict, run) if wrong and math.isnan(wrong[0]) else verdict
 
 
@@ -259,6 +266,7 @@ def field_equals(package: PackageFacts, run: Run, params: FieldEqualsParams) -> 
         nan = any(one.nan for v in wrong[0].values for one in differences(v, params.value, params.tolerance))
         near = near_texts(wrong[0].values, params.value)
         verdict = _other_value(wrong, found, run, params).seeking("quoted", *near)
+        verdict = verdict.based_on(**_shared(wrong[0], params))
         verdict = verdict if verdict.basis.wrong else verdict.of_value(nan=nan)
         ending = explain_early_end(package, run) if params.when == "last" else None
         if ending is not None and not ending.by_itself:  # it may have come to another value
@@ -273,12 +281,51 @@ def field_equals(package: PackageFacts, run: Run, params: FieldEqualsParams) -> 
     return verdict.about(expected=expected, measured=verdict.measured or _values(asked), citations=cited)
 
 
-def _has_other_sign(found: Sequence[Reading], params: FieldEqualsParams) -> bool:
-    """Return whether all the values come in their order, each with the opposite sign."""
-    numbers = [v for v in params.values if isinstance(v, int | float) and not isinstance(v, bool)]
-    readings = iter(found)
-    in_order = all(any(params.is_at(one, -value) for one in readings) for value in numbers)
-    return in_order and any(numbers) and len(numbers) == len(params.values)
+def _all_alike(found: Sequence[Reading], params: FieldEqualsParams) -> Verdict | None:
+    """Return the loss where all the values come in their order, each with the opposite sign, turned from true to false,
+    or so many times as large."""
+    numbers = [value for value in params.values if is_number(value)]
+    are_numbers, is_bool = len(numbers) == len(params.values), all(isinstance(v, bool) for v in params.values)
+    what, asked = f"{params.field} of {params.topic}", f"where {params.words} is asked for"
+
+    def come(values: Sequence[object], tolerance: float) -> bool:
+        readings = iter(found)
+        near = params.model_copy(update={"tolerance": tolerance})
+        return all(any(near.is_at(one, value) for one in readings) for value in values)
+
+    if are_numbers and any(numbers) and come([-one for one in numbers], params.tolerance):
+        why, hint, shared = "has the opposite sign", f"reverse the sign of {params.field}", OTHER_SIGN
+    elif is_bool and len(set(params.values)) > 1 and come([not one for one in params.values], 0):
+        why, hint, shared = "is the other way round", "turn what you compare the other way round", OPPOSITE
+    elif (
+        are_numbers
+        and (by := _factor(found, numbers))
+        and come([by * n for n in numbers], abs(by) * SLIGHTLY)
+    ):
+        why, shared = f"is {by:.4g} times what is asked for", factor_words(by)
+        hint = f"multiply {params.field} by {1 / by:.4g}, or look for a unit or a factor that is wrong"
+    else:
+        return None
+    verdict = failed(f"{what} {why}: {_values(found)}, {asked}", hint=hint)
+    return verdict.based_on(lost_to=(beyond_words(params, shared),))
+
+
+def _factor(found: Sequence[Reading], wanted: Sequence[float]) -> float:
+    """Return how many times what is wanted comes, by the first of both that are not 0; 0 where that cannot be said."""
+    came = [
+        one.values[0] for one in found if len(one.values) == 1 and is_number(one.values[0]) and one.values[0]
+    ]
+    other = [one for one in wanted if one]
+    by = came[0] / other[0] if came and len(set(other)) > 1 else 0.0
+    return by if math.isfinite(by) and abs(by) != 1 else 0.0
+
+
+SLIGHTLY = 1e-3
+OPPOSITE = "the opposite"
+
+
+def factor_words(by: float) -> str:
+    return f"{by:.3g} times as large"
 
 
 def _in_order(
@@ -290,9 +337,8 @@ def _in_order(
     verdict = text if found is not sent else passed(f"{what} is {params.words}")
     for number, value in enumerate(params.values):
         here = next((n for n in range(at, len(found)) if params.is_at(found[n], value)), None)
-        if here is None and _has_other_sign(found, params):
-            message = f"{what} has the opposite sign: {_values(found)}, where {params.words} is asked for"
-            verdict = failed(message, hint=f"reverse the sign of {params.field}")
+        if here is None and (alike := _all_alike(found, params)):
+            verdict = alike
             break
         if here is None and len(found) == len(params.values):  # none is missing: each has its place
             verdict = _in_another_order(found, params)
@@ -311,6 +357,8 @@ def _in_order(
                 break
             make = f"set {params.field} to" if found[at:] else f"publish another message, with {params.field}"
             hint = f"{make} {value_text(value)}{before}; rostopic echo {params.topic} shows what your node publishes"
+            if item := taken_from(found[at], value, run.channels, params.topic) if found[at:] else None:
+                message, hint = _of_other_item(message, item, params)
             verdict = failed(message, hint=hint)
             later = any(params.is_at(one, v) for one in found[at:] for v in params.values[number + 1 :])
             if later or not found[at:]:  # one alone may have been lost on its way
@@ -348,7 +396,8 @@ def _begins_late(found: Sequence[Reading], params: FieldEqualsParams, *, is_firs
     `is_first`: the first value never comes."""
     what, values = f"{params.field} of {params.topic}", params.values
     if not is_first and (told := begins_later(found, values, params.is_at)):
-        return failed(f"{what} {told}", hint=f"publish {value_text(values[0])} first")
+        verdict = failed(f"{what} {told}", hint=f"publish {value_text(values[0])} first")
+        return verdict.based_on(lost_to=(begins_without(params, values[0]),))
     missing = len(values) - len(found)
     if not is_first or not found or missing <= 0 or not all(map(params.is_at, found, values[missing:])):
         return None
@@ -394,9 +443,7 @@ def _other_value(
     hint = one_for_another(first.values, params.value) or _to_be_set(params, where)
     own = sent_by(run, params.topic, params.of)
     beside = "" if other else set_beside(own, first.time_ns, params.field, params.value, params.tolerance)
-    if beside:
-        seen += f"; {beside} is {value_text(params.value)}"
-        hint += f": {suspect_field(params.field, beside)}"
+    seen, hint = _from_elsewhere(first, run, params, beside, (seen, hint))
     if params.when == "any":
         none = f"in none of {plural(len(found), 'message')}: at first {seen}"
         message = f"{params.field} of {params.topic} is {params.words} {none}"
@@ -426,6 +473,52 @@ def _other_value(
     if since := turned_wrong(found, params.value):  # a callback that fails later did not do it
         verdict = verdict.based_on(wrong="order" if MOVED in why else "place", due=((run.start_ns, since),))
     return verdict.if_repeated()
+
+
+OTHER_SIGN = "the other sign"
+
+
+def beyond_words(params: FieldParams, what: str, end: float | None = None) -> str:
+    """Return what is wrong with a field in words that two criteria share."""
+    return f"{params.field} of {params.topic}: {what}{'' if end is None else f' {end:g}'}"
+
+
+def begins_without(params: FieldParams, value: object) -> str:
+    return beyond_words(params, f"begins without {value_text(value)}")
+
+
+def _shared(wrong: Reading, params: FieldEqualsParams) -> dict[str, tuple[str, ...]]:
+    """Return what another criterion on the field may be lost to as well: a bound that the value is beyond, a sign, or a
+    first message."""
+    got, wanted = wrong.values[0] if len(wrong.values) == 1 else None, params.value
+    found: tuple[str, ...] = (begins_without(params, wanted),) if params.when == "first" else ()
+    if isinstance(got, bool) and isinstance(wanted, bool):
+        return {"lost_to": found, "beyond": (beyond_words(params, OPPOSITE),)}
+    if not is_number(got) or not is_number(wanted) or math.isnan(got):
+        return {"lost_to": found}
+    found += (beyond_words(params, OTHER_SIGN),) if wanted and abs(got + wanted) <= params.tolerance else ()
+    beyond = [beyond_words(params, "below" if got < wanted else "above", wanted)]
+    beyond += [beyond_words(params, factor_words(got / wanted))] if got and wanted else []
+    return {"lost_to": found, "beyond": (*beyond,)}
+
+
+def _from_elsewhere(
+    first: Reading, run: Run, params: FieldEqualsParams, beside: str, told: tuple[str, str]
+) -> tuple[str, str]:
+    """Return what is told with the part of a message, or the other field (`beside`), from which a wrong value comes."""
+    if item := taken_from(first, params.value, run.channels, params.topic):
+        return _of_other_item(told[0], item, params)
+    if not beside:
+        return told
+    seen = f"{told[0]}; {beside} is {value_text(params.value)}"
+    return seen, f"{told[1]}: {suspect_field(params.field, beside)}"
+
+
+def _of_other_item(said: str, item: tuple[str, str, str], params: FieldParams) -> tuple[str, str]:
+    """Return what is said, and the hint, where the field follows another part of the messages that the grader sent."""
+    topic, right, wrong = item
+    seen = f"{said}; it follows {wrong} of {topic}, and {right} is asked for"
+    return seen, ask_item(params.field, topic, right, wrong)
 
 
 def _to_be_set(params: FieldEqualsParams, where: str) -> str:

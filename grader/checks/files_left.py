@@ -166,7 +166,8 @@ def file_left(package: PackageFacts, run: Run, params: FileLeftParams) -> Verdic
     if not started:
         verdict = not_started(params.process or "the program")
     elif not found:
-        verdict = _not_left(files, package, run, params)
+        missing = (f"{run.scenario}: no {params.file}",)
+        verdict = _not_left(files, package, run, params).based_on(lost_to=missing)
     elif found[0].data is None:
         message = f"{found[0].path} is too large to be read: {found[0].size_bytes >> 20} MB"
         verdict = failed(message, hint="write only what the handout asks for")

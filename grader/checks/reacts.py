@@ -561,9 +561,9 @@ def _judge_unanswered(
     answers: Sequence[Answer], run: Run, params: ReactsParams, instead: tuple[str, ...] | None
 ) -> Verdict | None:
     hint = f"each time that {params.trigger.words} comes, publish {params.effect.words}"
-    hint = (
-        keep_time(params.least_s) if params.least_s else f"{hint}, in the callback of {params.trigger.topic}"
-    )
+    if params.trigger.topic != params.effect.topic:
+        hint = f"{hint}, in the callback of {params.trigger.topic}"
+    hint = keep_time(params.least_s) if params.least_s else hint
     if is_called(run, params.trigger.topic):
         hint = f"look at what the callback of {params.trigger.topic} sets: {params.effect.words} has to follow a call"
     if params.of != "student":

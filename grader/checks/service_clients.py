@@ -12,7 +12,7 @@ from grader.checks.registry import Refers, check
 from grader.checks.support.clocks import excused, run_seconds, why_late
 from grader.checks.support.exit_causes import explain_early_end, explain_error
 from grader.checks.support.fields import Difference, differences, fields_text
-from grader.checks.support.processes import LOGGERS, GlobalName, lives
+from grader.checks.support.processes import LOGGERS, GlobalName, early_end, lives
 from grader.checks.support.text import action_client, near_names, python_or_cpp, service_client, shown
 from grader.checks.support.topics import cite, no_node, nodes_on, topics_with
 from grader.evidence.events import MISFIT, OTHER_TYPE, ActorEvent
@@ -177,6 +177,12 @@ def _fault(
         return _other_request(params, wanted, left, run)
     with_fields = f" with {fields_text(wanted)}" if wanted else ""
     what = f"{params.service} is called {plural(came, 'time')}, but there was no other call{with_fields}"
+    ended = early_end(run)
+    by_itself = ended is not None and (ended.end is None or ended.end.signal is None)
+    if by_itself and end is not None and not (error or end.citations or end.of_machine):
+        needed = plural(max(len(params.wanted), params.at_least), "call")
+        hint = f"{needed} are needed, and the program ends after {came}: let it go on, and call it again"
+        return failed(f"{what}: {end.cause}", hint=hint).based_on(lost_to=(f"{run.scenario}: {what}",))
     if end := end or error:
         return end.verdict(failed, f"{what}: {end.cause}")
     return failed(what, hint=f"{plural(len(params.wanted), 'call')} are needed: call it again").if_repeated()

@@ -144,10 +144,13 @@ def charge_once(
     rubric: Rubric, verdicts: Mapping[str, Verdict], judged: Collection[str] = ()
 ) -> dict[str, Verdict]:
     """Return the verdicts, with those blocked that lost all of their points to what another one has lost its own to
-    already: an exception, a topic that no node hears, what the build did not make, a definition, a script that is not
-    there or that Python cannot read. `requires` names nothing that is lost where the node goes on after it, as after
-    one in a callback, or ends of it in another run. `judged` are the criteria that a repaired copy has judged."""
+    already: an exception, a topic that no node hears, what the build did not make, a definition, a value that is not
+    kept within its bounds, a first message or a file that is missing, a script that is not there or that Python cannot
+    read. `requires` names nothing that is lost where the node goes on after it, as after one in a callback, or ends of
+    it in another run. `judged` are the criteria that a repaired copy has judged."""
     charged, told = dict[str, str](), dict(verdicts)
+    lost = [c.id for c in reversed(rubric.criteria) if verdicts[c.id].status is Status.FAIL]
+    by_itself = {one: name for name in lost for one in verdicts[name].basis.lost_to}
     # students see the hint of the one that is charged: where the rubric asks for it, the one that asks for no exception
     for criterion in sorted(
         rubric.criteria, key=lambda c: (c.visibility != "visible", not c.points, c.check != "callbacks-clean")
@@ -160,6 +163,10 @@ def charge_once(
         root = root or _of_files(rubric, verdicts, verdict)
         if not root and verdict.basis.charged_once:
             root = charged.setdefault(verdict.basis.cause, criterion.id)
+        if not root:
+            root = next((charged[one] for one in verdict.basis.lost_to if one in charged), "")
+            root = root or next((by_itself[one] for one in verdict.basis.beyond if one in by_itself), "")
+            charged.update(dict.fromkeys(verdict.basis.lost_to, root or criterion.id))
         if root and root != criterion.id:
             told[criterion.id] = _blocked(verdict, root, f"blocked by {root}: {verdict.message}")
     return {name: _at_root(verdict, told) for name, verdict in told.items()}

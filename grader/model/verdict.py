@@ -163,6 +163,12 @@ class Basis(Record):
     """What a process ended of, in words that are the same in every verdict that rests on it."""
     charged_once: bool = False
     """The same cause costs one criterion its points, and blocks the others that lost theirs to it."""
+    lost_to: tuple[str, ...] = ()
+    """What is wrong with the messages or files, in words that two criteria share which ask for it: it is charged to the
+    first alone."""
+    beyond: tuple[str, ...] = ()
+    """Such words that may be true of one wrong value, too, by chance: a bound that it is beyond, the opposite, so many
+    times as large. Only where another criterion is lost to one of them, that explains this one."""
     judged_by: str = ""
     """The check of what it was lost to: a lost criterion that has it is charged alone."""
     meant: str = ""

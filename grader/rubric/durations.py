@@ -188,6 +188,16 @@ def often_faults(about: WrittenCriterion) -> Iterator[Fault]:
         if is_number(asked) and is_number(lasting_s) and asked > FASTEST_HZ * lasting_s:
             fault = f"{asked} in {lasting_s:g} s, which {words}, are more than {FASTEST_HZ} a second"
             yield (*about.at, key), fault
+    least, apart_s = about.given.get("at_least", 1), about.given.get("apart_s")
+    run_s = longest_s(about.scenario) if about.check == "calls" else None
+    if (
+        is_number(run_s)
+        and is_number(apart_s)
+        and is_number(least)
+        and (needed_s := (least - 1) * apart_s) > run_s
+    ):
+        fault = f"{least} calls take {needed_s:g} s then, and {about.run} lasts {run_s:.3g} s at most: it is in seconds"
+        yield (*about.at, "apart_s"), fault
 
 
 def goal_of(about: WrittenCriterion) -> dict[str, Any] | None:

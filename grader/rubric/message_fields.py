@@ -69,27 +69,6 @@ POSES = (
     "turtlesim/Pose",
 )
 """Types of which a pose can be read, odometry before all others."""
-RANGES = {
-    ("sensor_msgs/BatteryState", "percentage"): (0, 1),
-    ("sensor_msgs/BatteryState", "power_supply_status"): (0, 4),
-    ("sensor_msgs/BatteryState", "power_supply_health"): (0, 8),
-    ("sensor_msgs/BatteryState", "power_supply_technology"): (0, 6),
-    ("sensor_msgs/RelativeHumidity", "relative_humidity"): (0, 1),
-    ("sensor_msgs/NavSatFix", "latitude"): (-90, 90),
-    ("sensor_msgs/NavSatFix", "longitude"): (-180, 180),
-    ("sensor_msgs/NavSatStatus", "status"): (-1, 2),
-    ("sensor_msgs/Range", "radiation_type"): (0, 1),
-    ("visualization_msgs/Marker", "type"): (0, 11),
-    ("visualization_msgs/Marker", "action"): (0, 3),
-    ("std_msgs/ColorRGBA", "r"): (0, 1),
-    ("std_msgs/ColorRGBA", "g"): (0, 1),
-    ("std_msgs/ColorRGBA", "b"): (0, 1),
-    ("std_msgs/ColorRGBA", "a"): (0, 1),
-}
-"""Between which values a field is, by the comments and the constants in its message's definition."""
-SHARE, PERCENT_MIN = (0, 1), 3
-ROUNDED = 0.02
-"""So much of its range beyond it, a bound allows for a value that is rounded."""
 VELOCITIES = ("geometry_msgs/Twist", "geometry_msgs/TwistStamped")
 PLACES = frozenset({"ends-at", "path", "stays-within"})
 """Checks of where a robot is."""
@@ -175,40 +154,6 @@ def _other_size(criterion: WrittenCriterion, rubric: WrittenRubric) -> Iterator[
             (*criterion.at, "value"),
             f"has {len(cells)} cells, and a map of {width} by {height} has {width * height}",
         )
-
-
-def range_warnings(rubric: WrittenRubric) -> Iterator[Fault]:
-    """Yield values that a field's type would allow, and that its definition gives no meaning."""
-    given: list[tuple[KeyPath, set[str], str, object]] = []
-    for criterion in rubric.criteria:
-        for at, asked in criterion.conditions:
-            types = set(map(str, types_of(str(asked.get("topic")), rubric, criterion.scenario)))
-            field = str(asked.get("field"))
-            given += [((*at, key), types, field, asked.get(key)) for key in ("value", "min", "max")]
-            given += [
-                ((*at, "values", n), types, field, v) for n, v in enumerate(as_list(asked.get("values")))
-            ]
-    for at, kind, one in rubric.parts():
-        sent = [("value", one.get("value")), *(("values", v) for v in as_list(one.get("values")))]
-        for key, value in sent if kind == "publish" else ():
-            type_ = str(one.get("type"))
-            given += [((*at, key, field), {type_}, str(field), v) for field, v in as_map(value).items()]
-    for path, types, field, value in given:
-        limits = [RANGES.get((kind, field)) for kind in types]
-        if not is_number(value) or len(limits) != 1 or limits[0] is None:
-            continue
-        low, high = limits[0]
-        rounded = ROUNDED * (high - low) if path[-1] in {"min", "max"} else 0
-        # A node may be sent one on purpose that is a little too large; in percent, it would be very small.
-        on_purpose = limits[0] == SHARE and "publish" in path and high < value < PERCENT_MIN
-        if not low - rounded <= value <= high + rounded and not on_purpose:
-            yield path, f"{field} of {min(types)} is {_in_range(limits[0], value)}"
-
-
-def _in_range(limits: tuple[int, int], value: float) -> str:
-    words = f"{limits[0]} to {limits[1]}, and never {value:g}"
-    is_percent = limits == SHARE and PERCENT_MIN <= value <= 100
-    return f"{words}: write {value / 100:g} for {value:g} %" if is_percent else words
 
 
 def _no_types(rubric: WrittenRubric, known: Definitions) -> Iterator[Fault]:

@@ -62,7 +62,7 @@ OLD_NAMES = {"byte": "int8", "char": "uint8"}
 TEXTS = {"prints": ("text", "template"), "logs": ("text", "template"), "definition": ("file",)}
 """By check, the parameters that the handout has as text."""
 RANGE = re.compile(
-    r"(-?\d+(?:\.\d+)?) (?:to|and) (-?\d+(?:\.\d+)?)(?![\w.]\d)( ?(?:°|deg|%|percent|[cm]m\b))?"
+    r"(-?\d+(?:\.\d+)?) (?:to|and|or above|or more than) (-?\d+(?:\.\d+)?)(?![\w.]\d)( ?(?:°|deg|%|percent|[cm]m\b))?"
 )
 NAME = re.compile(r"[~/\w.-]+")
 SENTENCE_END = re.compile(r"(?<=[.;])\s+")
@@ -154,7 +154,10 @@ def _other_range(criterion: WrittenCriterion, handout: str) -> Iterator[Fault]:
     for sentence in SENTENCE_END.split(handout):
         said = RANGE.search(sentence)
         # what is in another unit than the field's has other numbers
-        is_about = said and re.search(rf"\b{re.escape(field)}s?\b", sentence) and not said[3]
+        words = {field, str(given.get("topic")).rpartition("/")[2]} - {"data"}
+        is_about = (
+            said and not said[3] and any(re.search(rf"\b{re.escape(one)}s?\b", sentence) for one in words)
+        )
         if said and is_about and not {low, high} & {*map(float, said.groups()[:2])}:
             yield (*criterion.at, "min"), f"to max is {low:g} to {high:g}, and the handout has {said[0]}"
 
@@ -180,7 +183,9 @@ def _said_values(made_up: dict[str, Any], handout: str) -> Iterator[Fault]:
 
 def _shifted_factors(made_up: dict[str, Any], handout: str) -> Iterator[Fault]:
     """Yield numbers by which a made-up value is computed, and that the handout has ten times as large or as small."""
-    said = {float(number) for number in PLAIN_NUMBER.findall(handout)}
+    # A default is no factor.
+    text = re.sub(r"\bdefaults?:?(?: to| is| of)? -?[\d.]+", "", handout)
+    said = {float(number) for number in PLAIN_NUMBER.findall(text)}
     for name, key in ((name, key) for name in made_up for key in ("sum", "product", "quotient")):
         for at, number in numbers_in((key,), as_map(made_up[name]).get(key)):
             meant = next((number / by for by in SHIFTS[:-1] if round(number / by, 9) in said), None)
@@ -347,6 +352,10 @@ def _sent_otherwise(rubric: WrittenRubric) -> Iterator[Fault]:
         if said and str(one.get("type")) not in said:
             fault = f"the handout says that {one['topic']} carries {join_words(sorted(said))}"
             yield (*path, "type"), fault
+        for at, text in texts_in(path, [one.get("value"), one.get("values")]) if kind == "publish" else ():
+            other = next((said for said in quoted if said.lower() == text.lower()), "")
+            if other and text not in quoted and text != at[-1]:
+                yield (*path, "value"), f"has {text}, and the handout `{other}`, in another case"
     services = [(path, one) for path, _, one in rubric.parts() if one.get("service") is not None]
     services += [(one.at, one.given) for one in rubric.criteria if one.check == "service"]
     for path, one in services:

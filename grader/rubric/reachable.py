@@ -95,6 +95,7 @@ def reach_faults(rubric: WrittenRubric, checks: Mapping[str, Check]) -> Iterator
             yield from _too_far(about, others)
     yield from _contradictions(criteria)
     yield from _other_effects(criteria)
+    yield from _answers_too_early(criteria)
     yield from _other_ends(criteria)
 
 
@@ -410,6 +411,37 @@ def _other_effects(criteria: Sequence[WrittenCriterion]) -> Iterator[Fault]:
                 fault = f"{message} is a cause for {earlier} too, which wants another effect"
                 yield (*criterion.at, "cause"), fault
         before.append((name, criterion.id, given))
+
+
+def _answers_too_early(criteria: Sequence[WrittenCriterion]) -> Iterator[Fault]:
+    """Yield causes that are true before that of another criterion, which wants silence until then on the topic of the
+    effect."""
+    asked = [one for one in criteria if one.check == "reacts" and one.given.get("never") is not True]
+    for silent in asked:
+        first, cause = _first_so(silent), as_map(silent.given.get("cause"))
+        topic, others = (
+            as_map(silent.given.get("effect")).get("topic"),
+            [one for one in asked if one is not silent],
+        )
+        is_any = as_map(silent.given.get("effect")).keys() == {"topic"}
+        if first < 1 or not is_any or silent.given.get("not_before") is False:
+            continue
+        for one in others:
+            early, its_cause = _first_so(one), as_map(one.given.get("cause"))
+            its_topic = as_map(one.given.get("effect")).get("topic")
+            if one.run != silent.run or its_topic != topic or its_cause.get("topic") != cause.get("topic"):
+                continue
+            if 0 <= early < first:
+                told = f"value {early + 1} that {one.run} sends on {cause.get('topic')} is a cause already"
+                until = f"{silent.id} wants nothing on {topic} before value {first + 1}"
+                yield (*one.at, "cause"), f"{told}, and {until}: ask for one of them in another run"
+
+
+def _first_so(criterion: WrittenCriterion) -> int:
+    """Return the number, from 0, of the first message that a run sends and that is a cause; -1 for none."""
+    cause = as_map(criterion.given.get("cause"))
+    sent = _sent_on(str(cause.get("topic")), criterion.scenario) or ()
+    return next((n for n, value in enumerate(sent) if _is_so(cause, value)), -1)
 
 
 def _differ(effect: dict[str, Any], other: dict[str, Any]) -> bool:

@@ -73,6 +73,8 @@ def names_seen_once(rubric: WrittenRubric, folder: Path) -> Iterator[Fault]:
     for path, text, near in _named_once(rubric, folder):
         if not near:
             yield path, f"nothing else in the rubric names {text}: is it spelt as in the handout?"
+    for path, text, said in _without_number(rubric):
+        yield path, f"nothing else in the rubric names {text}: is it {said}, as in the handout?"
     for path, word, near in _misspelt_words(rubric, code=False):
         fault = f'nothing else in the rubric has the word {word}: did you mean "{near}", as in the handout?'
         yield path, fault
@@ -92,6 +94,24 @@ def misspelt_names(rubric: WrittenRubric, folder: Path) -> Iterator[Fault]:
         if near:
             fault = f'nothing else in the rubric names {text} (did you mean "{near}"?): '
             yield path, fault + "if it is right, say it in the handout too"
+
+
+def _without_number(rubric: WrittenRubric) -> Iterator[tuple[KeyPath, str, str]]:
+    """Yield each topic or service that one line alone has, and the handout with a number in it: `/turtle/cmd_vel`."""
+    said = {one.lstrip("~/") for one in re.findall(r"[~/\w]*/[\w/]*\w", rubric.handout)}
+    for path, text in rubric.texts:
+        name = text.lstrip("/")
+        if (
+            text[:1] != "/"
+            or "/" not in name
+            or not PROSE.isdisjoint(path)
+            or name in said
+            or re.search(r"\d", name)
+        ):
+            continue
+        numbered = [one for one in sorted(said) if one != name and re.sub(r"\d", "", one) == name]
+        if len(numbered) == 1 and _count(text, text, rubric.texts) == 1:
+            yield path, text, f"/{numbered[0]}"
 
 
 def _package(rubric: WrittenRubric) -> Iterator[tuple[KeyPath, str, str]]:

@@ -15,12 +15,11 @@ from typing import Any
 
 from grader.checks.support.fields import is_number
 from grader.rubric.durations import goal_of, probed_s
-from grader.rubric.message_fields import range_warnings
 from grader.rubric.prose_warnings import prose_warnings
 from grader.rubric.simulators import TRUE_POSE, robot_of, topics_of_programs
 from grader.rubric.started import argument_warnings
 from grader.rubric.step_faults import count_causes
-from grader.rubric.value_warnings import early_waits, value_warnings
+from grader.rubric.value_warnings import early_waits, hidden_packages, range_warnings, value_warnings
 from grader.rubric.yaml_lines import (
     Fault,
     KeyPath,
@@ -90,6 +89,7 @@ def warnings(rubric: WrittenRubric) -> Iterator[Fault]:
         if criterion.check == "connected":
             yield from _process_for_node(criterion, rubric)
     yield from range_warnings(rubric)
+    yield from hidden_packages(rubric)
     yield from prose_warnings(rubric)
     yield from argument_warnings(rubric)
     for criterion in rubric.criteria:
@@ -375,7 +375,10 @@ def _hard(criterion: WrittenCriterion) -> Iterator[Fault]:
     for key in ("heading_tolerance_deg", "tolerance_deg"):
         if is_number(given.get(key)) and given[key] < CLOSE_DEG:
             yield (*at, key), f"{given[key]:g} is very strict: it is in degrees"
-    if check in {"ends-at", "path"} and is_number(tolerance_m) and tolerance_m <= CLOSE_M:
+    # where no simulator moves, a node works out where the robot is, as exactly as it was told
+    moves = any(start.get("program") for start in starts_of(criterion.scenario))
+    moves |= str(given.get("topic")).endswith("cmd_vel")
+    if check in {"ends-at", "path"} and moves and is_number(tolerance_m) and tolerance_m <= CLOSE_M:
         yield (*at, "tolerance_m"), f"{tolerance_m:g} m is very strict: no robot keeps it"
 
 

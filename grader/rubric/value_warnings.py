@@ -7,12 +7,15 @@ import json
 import math
 import re
 from collections.abc import Iterator
+from pathlib import PurePosixPath
 from typing import Any
 
 from grader.checks.support.fields import is_number
+from grader.rubric.message_fields import types_of
 from grader.rubric.simulators import robot_of
 from grader.rubric.yaml_lines import (
     Fault,
+    KeyPath,
     WrittenCriterion,
     WrittenRubric,
     as_list,
@@ -32,7 +35,7 @@ SIDEWAYS = frozenset({"linear.y", "linear.z", "angular.x", "angular.y"})
 OTHER_WAYS = re.compile(
     r"\b(?:side\w*|strafe\w*|lateral\w*|holonomic\w*|omni\w*|mecanum|left|right|up|down|climb\w*|rise\w*|hover\w*|fl(?:y|ies)\w*"
     r"|drone|\w*copter|quad\w*|rotors?|uav|[ar]ov|boat|submarine|take\w*\Woff|legs?|legged|arm|roll|pitch|tilt\w*"
-    r"|altitude|height|(?:linear|angular)\.[xyz]|y)\b",
+    r"|altitude|height|linear\.[yz]|angular\.[xy]|y)\b",
     re.IGNORECASE,
 )
 """Words of a handout about a robot that may move otherwise."""
@@ -42,6 +45,36 @@ FORMS = frozenset({"from", "each", "repeat", "text", "integers"})
 """Keys of values that are no fields."""
 PLAIN = frozenset({0.0, 1.0})
 """These are in many requests and answers, by chance."""
+RANGES = {
+    ("sensor_msgs/BatteryState", "percentage"): (0, 1),
+    ("sensor_msgs/BatteryState", "power_supply_status"): (0, 4),
+    ("sensor_msgs/BatteryState", "power_supply_health"): (0, 8),
+    ("sensor_msgs/BatteryState", "power_supply_technology"): (0, 6),
+    ("sensor_msgs/RelativeHumidity", "relative_humidity"): (0, 1),
+    ("sensor_msgs/NavSatFix", "latitude"): (-90, 90),
+    ("sensor_msgs/NavSatFix", "longitude"): (-180, 180),
+    ("sensor_msgs/NavSatStatus", "status"): (-1, 2),
+    ("sensor_msgs/Range", "radiation_type"): (0, 1),
+    ("visualization_msgs/Marker", "type"): (0, 11),
+    ("visualization_msgs/Marker", "action"): (0, 3),
+    ("std_msgs/ColorRGBA", "r"): (0, 1),
+    ("std_msgs/ColorRGBA", "g"): (0, 1),
+    ("std_msgs/ColorRGBA", "b"): (0, 1),
+    ("std_msgs/ColorRGBA", "a"): (0, 1),
+}
+"""Between which values a field is, by the comments and the constants in its message's definition."""
+SHARE, PERCENT_MIN = (0, 1), 3
+ROUNDED = 0.02
+"""So much of its range beyond it, a bound allows for a value that is rounded."""
+QUATERNION = re.compile(r"(?:^|\.)(?:orientation|rotation|quaternion)\.[xyzw]$")
+"""A part of a rotation."""
+UNIT_MAX = 1 + ROUNDED
+SIZES = {
+    "sensor_msgs/Image": ("height", "step"),
+    "nav_msgs/OccupancyGrid": ("info.height", "info.width"),
+    "sensor_msgs/PointCloud2": ("height", "row_step"),
+}
+"""By type, the fields whose product is the number of items in `data`."""
 
 
 def value_warnings(criterion: WrittenCriterion, rubric: WrittenRubric) -> Iterator[Fault]:
@@ -50,6 +83,7 @@ def value_warnings(criterion: WrittenCriterion, rubric: WrittenRubric) -> Iterat
     yield from _not_driven(criterion, rubric.handout)
     yield from _swapped_params(criterion)
     yield from _left_out(criterion)
+    yield from _other_end_of_values(criterion, rubric)
     if criterion.check == "reacts":
         yield from _sooner_than_least(criterion)
     if criterion.check == "service-answers":
@@ -57,6 +91,89 @@ def value_warnings(criterion: WrittenCriterion, rubric: WrittenRubric) -> Iterat
     if criterion.check == "prints":
         yield from _all_numbers(criterion)
         yield from _of_another_run(criterion, rubric)
+
+
+def range_warnings(rubric: WrittenRubric) -> Iterator[Fault]:
+    """Yield values that a field's type would allow, and that its definition gives no meaning."""
+    yield from _other_sizes(rubric)
+    given: list[tuple[KeyPath, set[str], str, object]] = []
+    for criterion in rubric.criteria:
+        for at, asked in criterion.conditions:
+            types = set(map(str, types_of(str(asked.get("topic")), rubric, criterion.scenario)))
+            field = str(asked.get("field"))
+            given += [((*at, key), types, field, asked.get(key)) for key in ("value", "min", "max")]
+            given += [
+                ((*at, "values", n), types, field, v) for n, v in enumerate(as_list(asked.get("values")))
+            ]
+    for at, kind, one in rubric.parts():
+        sent = [("value", one.get("value")), *(("values", v) for v in as_list(one.get("values")))]
+        for key, value in sent if kind == "publish" else ():
+            type_ = str(one.get("type"))
+            given += [((*at, key, field), {type_}, str(field), v) for field, v in as_map(value).items()]
+    for path, types, field, value in given:
+        if QUATERNION.search(field) and is_number(value) and not -UNIT_MAX <= value <= UNIT_MAX:
+            how = "it is the sine or cosine of half an angle"
+            yield path, f"{field} of a quaternion is -1 to 1, and never {value:g}: {how}"
+            continue
+        limits = [RANGES.get((kind, field)) for kind in types]
+        if not is_number(value) or len(limits) != 1 or limits[0] is None:
+            continue
+        low, high = limits[0]
+        rounded = ROUNDED * (high - low) if path[-1] in {"min", "max"} else 0
+        # A node may be sent one on purpose that is a little too large; in percent, it would be very small.
+        on_purpose = limits[0] == SHARE and "publish" in path and high < value < PERCENT_MIN
+        if not low - rounded <= value <= high + rounded and not on_purpose:
+            yield path, f"{field} of {min(types)} is {_in_range(limits[0], value)}"
+
+
+def _in_range(limits: tuple[int, int], value: float) -> str:
+    words = f"{limits[0]} to {limits[1]}, and never {value:g}"
+    is_percent = limits == SHARE and PERCENT_MIN <= value <= 100
+    return f"{words}: write {value / 100:g} for {value:g} %" if is_percent else words
+
+
+def _other_sizes(rubric: WrittenRubric) -> Iterator[Fault]:
+    """Yield images and maps that are sent with more or fewer items than their sizes say."""
+    for at, kind, one in rubric.parts():
+        sizes = SIZES.get(str(one.get("type")))
+        values = [one.get("value"), *as_list(one.get("values"))] if kind in {"publish", "probe"} else []
+        for value in map(as_map, values) if sizes else ():
+            factors = [_inside(value, path) for path in sizes or ()]
+            data = value.get("data")
+            count = as_map(data).get("count") if isinstance(data, dict) else len(as_list(data)) or None
+            if not is_number(count) or not all(map(is_number, factors)) or count == math.prod(factors):
+                continue
+            told = join_words([f"{path} {n:g}" for path, n in zip(sizes or (), factors, strict=True)])
+            fault = f"has {count} items, and {told} make {math.prod(factors):g}"
+            yield (*at, "value", "data"), f"{fault}: a node that reads all of them fails"
+
+
+def _inside(value: object, path: str) -> Any:  # noqa: ANN401 - whatever the rubric has
+    for key in path.split("."):
+        value = as_map(value).get(key)
+    return value
+
+
+def _other_end_of_values(criterion: WrittenCriterion, rubric: WrittenRubric) -> Iterator[Fault]:
+    """Yield a first or last value that is not the first or last of those that another criterion lists."""
+    given, when = criterion.given, criterion.given.get("when")
+    if criterion.check != "field-equals" or when not in {"first", "last"} or "value" not in given:
+        return
+    keys = ("topic", "field")
+    for one in rubric.criteria:
+        values, is_same = (
+            as_list(one.given.get("values")),
+            all(one.given.get(k) == given.get(k) for k in keys),
+        )
+        if one.check != "field-equals" or one.run != criterion.run or not is_same or not values:
+            continue
+        end = values[0 if when == "first" else -1]
+        if one.given.get("repeats") is False and end != given["value"]:
+            how = "begins" if when == "first" else "ends"
+            fault = (
+                f"is {json.dumps(given['value'])}, and {one.id} {how} with {json.dumps(end)} in the same run"
+            )
+            yield (*criterion.at, "value"), fault
 
 
 def _sooner_than_least(criterion: WrittenCriterion) -> Iterator[Fault]:
@@ -82,6 +199,26 @@ def _sooner_than_least(criterion: WrittenCriterion) -> Iterator[Fault]:
             )
             yield (*criterion.at, "least_s"), fault
             return
+
+
+def hidden_packages(rubric: WrittenRubric) -> Iterator[Fault]:
+    """Yield scripts with the name of their package, where this has messages: Python finds the script in its place."""
+    texts = {
+        text.partition("/")[0] for path, text in rubric.texts if path[-1] in {"type", "file"} and "/" in text
+    }
+    has_types = {*rubric.packages} & (
+        texts | ({*rubric.packages[:1]} if texts & {"msg", "srv", "action"} else set())
+    )
+    seen = set[str]()
+    for at, start in rubric.starts():
+        script = str(start.get("script"))
+        name = PurePosixPath(script).stem
+        if script.endswith(".py") and name in has_types and name not in seen:
+            seen.add(name)
+            how = (
+                f"Python takes it for {name} in `import {name}.msg` or the like, and no script gets the types"
+            )
+            yield (*at, "script"), f"has the name of the package, {name}: {how}: give it another name"
 
 
 def early_waits(rubric: WrittenRubric) -> Iterator[Fault]:

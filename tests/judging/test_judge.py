@@ -405,6 +405,23 @@ def test_what_the_files_are_lost_to_is_charged_there(basis: dict[str, object], r
     assert charge_once(rubric(*asked, rated, said), passed_files) == passed_files
 
 
+def test_what_two_criteria_ask_of_one_thing_is_charged_once() -> None:
+    """A word that both share; one that may be true by chance explains only beside a criterion that is lost to it."""
+    asked = {**RATE, "requires": []}, {**CHATTER, "requires": []}
+    lost = failed("it is lost", hint="x")
+    missing, bound = ("no table.csv",), ("power: above 100",)
+    cases = [
+        ({"lost_to": missing}, {"lost_to": missing}, "", "rate"),
+        ({"lost_to": missing}, {"lost_to": bound}, "", ""),
+        ({"beyond": bound}, {"lost_to": bound}, "chatter", ""),
+        ({"beyond": bound}, {"beyond": bound}, "", ""),
+    ]
+    for one, other, rate, chatter in cases:
+        verdicts = {"rate": lost.based_on(**one), "chatter": lost.based_on(**other)}
+        told = charge_once(rubric(*asked), verdicts)
+        assert (told["rate"].blocked_by, told["chatter"].blocked_by) == (rate, chatter)
+
+
 def test_another_name_is_no_reason_for_silence() -> None:
     named = {
         "id": "node",

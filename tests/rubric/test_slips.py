@@ -591,8 +591,8 @@ def test_a_rate_may_be_that_of_a_parameter_which_the_run_sets(examples: Path) ->
     path = _spoiled(
         examples,
         "battery",
-        "script: scripts/battery_monitor.py}",
-        'script: scripts/battery_monitor.py, args: ["_hz:=4"]}',
+        "script: scripts/watch_battery.py}",
+        'script: scripts/watch_battery.py, args: ["_hz:=4"]}',
     )
     text = path.read_text(encoding="utf-8").replace("rate_hz: 5, cause", "rate_hz: 4, cause")
     path.write_text(text, encoding="utf-8")
@@ -604,7 +604,7 @@ def test_a_run_without_the_cause_may_have_another_rate(examples: Path) -> None:
     """The rate before anything is sent, in a run of its own, and those that messages bring about."""
     before = """  before:
     title: Nothing is sent
-    start: [{name: monitor, script: scripts/battery_monitor.py}]
+    start: [{name: monitor, script: scripts/watch_battery.py}]
     until: {topics: [/heartbeat], window_s: 6}
   launched:
 """

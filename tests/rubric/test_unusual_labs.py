@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from grader.rubric.load import load_rubric, warnings_of
+from tests.rubric.samples import faults
 
 RUNS = """\
 schema: grader.rubric/1
@@ -240,3 +241,87 @@ def test_what_nothing_else_says_is_a_warning(old: str, new: str, warning: str, t
     path.write_text(text.replace(old, new, 1), encoding="utf-8")
     (told,) = warnings_of(load_rubric(str(path)), path.name)
     assert told.endswith(warning)
+
+
+JOYSTICK = """
+schema: grader.rubric/1
+id: joystick
+title: Drive with a joystick
+version: "1"
+package: joy_drive
+handout: >
+  Write a node `joy_drive` that hears `joy` (sensor_msgs/Joy) and publishes on `cmd_vel` (geometry_msgs/Twist), within
+  -0.6 and 0.6 m/s for `linear.x`. The images on `/image` are of the encoding `mono8`. The launch file remaps to
+  `turtle1/cmd_vel`.
+scenarios:
+  drives:
+    title: The button is pressed, then released
+    start: [{name: drive, script: scripts/drive.py}]
+    steps:
+      - publish: {topic: /joy, type: sensor_msgs/Joy, value: {axes: [0, 0.5], buttons: [0]}, count: 10}
+      - publish: {topic: /joy, type: sensor_msgs/Joy, value: {axes: [0, 0.5], buttons: [1]}, count: 10}
+      - publish:
+          topic: /image
+          type: sensor_msgs/Image
+          value: {height: 2, width: 3, step: 3, encoding: mono8, data: [1, 2, 3, 4, 5, 6]}
+      - wait: {seconds: 1}
+  launched:
+    title: The launch file
+    start: [{name: launch, launch: drive.launch}]
+    steps: [publish: {topic: /joy, type: sensor_msgs/Joy, value: {axes: [0, 0.5], buttons: [1]}}, wait: {seconds: 1}]
+criteria:
+  - {id: silent, title: Without the button nothing comes, points: 40, check: reacts, scenario: drives,
+     with: {cause: {topic: /joy, field: "buttons[0]", value: 1}, effect: {topic: /cmd_vel}, within_s: 0.4}}
+  - {id: speed, title: It drives, points: 20, check: field-equals, scenario: drives, requires: [silent],
+     with: {topic: /cmd_vel, field: linear.x, value: 0.25}}
+  - {id: launch, title: The launch file remaps, points: 20, check: field-equals, scenario: launched,
+     with: {topic: /turtle1/cmd_vel, field: linear.x, value: 0.25}}
+  - {id: turned, title: It looks ahead, points: 20, check: field-equals, scenario: drives, requires: [silent],
+     with: {topic: /pose, field: pose.orientation.z, value: 0.1, tolerance: 0.01}}
+"""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "warning"),
+    [
+        ("encoding: mono8", "encoding: MONO8", "has MONO8, and the handout `mono8`, in another case"),
+        ("step: 3", "step: 6", "has 6 items, and height 2 and step 6 make 12: a node that reads all of them fails"),
+        ("value: 0.1, tol", "value: 90, tol", "pose.orientation.z of a quaternion is -1 to 1, and never 90"),
+        ("topic: /turtle1/cmd_vel", "topic: /turtle/cmd_vel", "names /turtle/cmd_vel: is it /turtle1/cmd_vel, as in"),
+        ("linear.x, value: 0.25}}\\n  - {id: launch", "linear.y, value: 0.25}}\\n  - {id: launch", "drives no robot"),
+        ("title: It drives", "title: It drives", ""),
+    ],
+)  # fmt: skip
+def test_slips_in_what_is_sent_are_told(tmp_path: Path, old: str, new: str, warning: str) -> None:
+    path = tmp_path / "joystick.yaml"
+    text = JOYSTICK.replace(old.replace("\\n", "\n"), new.replace("\\n", "\n"), 1)
+    path.write_text(text, encoding="utf-8")
+    told = warnings_of(load_rubric(str(path)), path.name)
+    assert [one for one in told if warning in one] if warning else told == []
+
+
+def test_an_answer_before_the_silence_ends_is_refused(tmp_path: Path) -> None:
+    """The button is up in the first messages, and one criterion wants nothing until it is pressed."""
+    path = tmp_path / "joystick.yaml"
+    stops = """  - {id: stops, title: It stops, points: 20, check: reacts, scenario: drives, requires: [silent],
+     with: {cause: {topic: /joy, field: "buttons[0]", value: 0}, effect: {topic: /cmd_vel, field: linear.x, value: 0},
+            within_s: 0.4, not_before: false}}
+"""
+    path.write_text(JOYSTICK.replace("points: 40", "points: 20") + stops, encoding="utf-8")
+    told = "value 1 that drives sends on /joy is a cause already, and silent wants nothing on /cmd_vel before value 2"
+    found = f"joystick.yaml:37: criteria[4].with.cause: {told}: ask for one of them in another run"
+    assert faults(path)[-1:] == [found]
+
+
+def test_a_script_with_the_name_of_its_package_hides_its_messages(tmp_path: Path) -> None:
+    """`import joy_drive.msg` would find the script; without a type of the package, nothing is hidden."""
+    path = tmp_path / "joystick.yaml"
+    for typed, count in (("joy_drive/Stick", 1), ("sensor_msgs/Joy", 0)):
+        text = JOYSTICK.replace("scripts/drive.py", "scripts/joy_drive.py")
+        stick = "value: {axes: [0, 0.5], buttons: [1]}, count: 10}"
+        text = text.replace(stick, f"{stick}\n      - wait: {{topic: /stick}}", 1)
+        kind = "{id: kind, title: Its own type, points: 20, check: topic-type, scenario: drives, "
+        kind += f"requires: [silent], with: {{topic: /stick, type: {typed}}}}}"
+        path.write_text(text.replace("points: 40", "points: 20") + f"  - {kind}\n", encoding="utf-8")
+        told = [one for one in warnings_of(load_rubric(str(path)), path.name) if "another name" in one]
+        assert len(told) == count

@@ -14,7 +14,7 @@ from grader.model.verdict import Verdict
 _NOT_SET = re.compile(r"the parameter '([~\w/]+)' is not set")
 
 
-def explain_by_absent_parameter(_check: Check, _package: PackageFacts, run: Run, verdict: Verdict) -> Verdict:
+def explain_by_absent_parameter(_check: Check, package: PackageFacts, run: Run, verdict: Verdict) -> Verdict:
     """Return a loss by a parameter that is not set with the namespace in which it is: a default would hide it."""
     found = _NOT_SET.search(verdict.message)
     name = found[1].lstrip("~/") if found else ""
@@ -32,5 +32,20 @@ def explain_by_absent_parameter(_check: Check, _package: PackageFacts, run: Run,
             hint = f"write {get_param(right)}"
             if right.startswith("/") and asked == f"{space}/{name}":
                 hint = f"set it in the node's namespace, {space}: in the launch file, inside its <group>"
-            return verdict.explained(f"{node} asks for {asked}, and {place} is set", hint, cause=asked)
+            if asked == f"{node}/{name}":
+                hint = _move_into_node(package, node, place.rpartition("/")[0]) or hint
+            return verdict.explained(
+                f"{node} asks for {asked}, and {place} is set", hint, cause=asked
+            ).based_on(charged_once=True)
     return verdict
+
+
+def _move_into_node(package: PackageFacts, node: str, space: str) -> str:
+    """Return what to do where a launch file loads a node's own parameters beside its <node>; "" where it does not."""
+    for file in package.launch_files:
+        loads = [one for one in file.loads if one.namespace.rstrip("/") == space]
+        nodes = [one for one in file.brings if one.full_name == node]
+        if len(loads) == 1 and len(nodes) == 1:
+            where = f"the <node> on line {nodes[0].line} of {nodes[0].file}, between <node …> and </node>"
+            return f"move the <rosparam> from line {loads[0].line} of {loads[0].file} into {where}"
+    return ""

@@ -9,9 +9,10 @@ from __future__ import annotations
 
 import math
 import re
+from bisect import bisect
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from itertools import chain
+from itertools import chain, permutations
 from typing import Annotated, Any, NamedTuple, Protocol, TypeGuard
 
 from pydantic import AfterValidator
@@ -336,6 +337,59 @@ def made_of(found: Sequence[Reading], channels: Iterable[Channel], wanted: _Want
         if ends == (len(sent),) and is_sum and len(sent) not in sizes:
             return f"so many messages came on {topic}", "add what is in each message, and not 1"
     return None
+
+
+def taken_from(
+    got: Reading, wanted: object, channels: Iterable[Channel], topic: str
+) -> tuple[str, str, str] | None:
+    """Return the topic, the part and the other one of what the grader sent, where a number is to the other part as the
+    wanted number is to that part, and no two others are: `linear.x` of `axes[3]` in place of `axes[1]`. Else None."""
+    came = got.values[0] if len(got.values) == 1 else None
+    if not is_number(came) or not is_number(wanted) or not came or not wanted or abs(came) == abs(wanted):
+        return None
+    found = set[tuple[str, str, str]]()
+    for channel in channels:
+        before = bisect(channel.times_ns, got.time_ns)
+        if not channel.by_grader or channel.topic == topic or not before or channel.topic in UNREAD:
+            continue
+        parts = [(name, n) for name, n in _items(channel.values[before - 1]) if is_number(n) and n]
+        for (wrong, one), (right, other) in permutations(parts[:ITEMS_MAX], 2):
+            if not _is_usual(came, wanted, (one, other)) and math.isclose(
+                came / wanted, one / other, rel_tol=ITEM_ROUNDING
+            ):
+                found.add((channel.topic, right, wrong))
+    return found.pop() if len(found) == 1 else None
+
+
+def _is_usual(came: float, wanted: float, parts: tuple[float, float]) -> bool:
+    """Return whether numbers are as they are by chance: alike, one a round part of the other, or small whole ones."""
+    ratio = came / wanted
+    is_round = any(
+        abs(one - round(one)) < ITEM_ROUNDING for one in (ROUND_PARTS * ratio, ROUND_PARTS / ratio)
+    )
+    is_itself = parts == (came, wanted) and not all(
+        abs(one) < ROUND_PARTS and one == int(one) for one in parts
+    )
+    return abs(parts[0]) == abs(parts[1]) or (is_round and not is_itself)
+
+
+ROUND_PARTS = 20
+UNREAD = frozenset({"/clock", "/tf", "/tf_static"})
+ITEMS_MAX = 12
+ITEM_ROUNDING = 1e-5
+
+
+def _items(value: object, path: str = "") -> Iterator[tuple[str, object]]:
+    """Yield all parts of a message that are no lists and maps, those of short lists too."""
+    if isinstance(value, Mapping):
+        for name, inner in value.items():
+            if name != "header":
+                yield from _items(inner, f"{path}.{name}" if path else str(name))
+    elif isinstance(value, list | tuple):
+        for n, inner in enumerate(value[:ITEMS_MAX]):
+            yield from _items(inner, f"{path}[{n}]")
+    else:
+        yield path, value
 
 
 def _are_the_same(got: Sequence[object], wanted: Sequence[object]) -> bool:

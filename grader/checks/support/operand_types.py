@@ -26,7 +26,7 @@ _BY_SIZE = (ast.Lt, ast.LtE, ast.Gt, ast.GtE)
 def explain_operand(found: Traceback, package: PackageFacts) -> tuple[str, str] | None:
     """A text or a message and something else are added, or text is compared with a number: which of both does not fit,
     where Python marks the place."""
-    if compared := _compared_text(found):
+    if compared := _compared_text(found) or _number_of_bytes(found):
         return compared
     if not (match := _ADDED.search(found.message)) or {"Time", "Duration"}.intersection(match.groups()):
         return None
@@ -44,6 +44,14 @@ def explain_operand(found: Traceback, package: PackageFacts) -> tuple[str, str] 
         whole = f"{other or 'one side'} is the whole message ({kind})"
         return whole, f"write `{value}` instead of `{other or 'msg'}`"
     return _beside_text(other, kind) if of_text else None
+
+
+def _number_of_bytes(found: Traceback) -> tuple[str, str] | None:
+    """`ord(…)` of what is a number already, as the items of bytes are under Python 3."""
+    call = re.search(r"\bord\(\s*([\w.\[\]]+)\s*\)", found.innermost.source)
+    if call is None or "ord() expected" not in found.message or "int found" not in found.message:
+        return None
+    return f"in Python 3, {call[1]} is a number already", f"write `{call[1]}` instead of `{call[0]}`"
 
 
 def _compared_text(found: Traceback) -> tuple[str, str] | None:

@@ -301,8 +301,9 @@ def _is_misread(package: PackageFacts, run: Run, verdict: Verdict) -> bool:
 def _asked_before(run: Run, asked: str, right: str) -> str:
     """Return what else to write where a node asked whether the parameter is there, and so never read it."""
     events = (e for _, e in run.actors if e.action == "read" and absolute_name(e.topic or "") == asked)
-    has = python_or_cpp(f"`rospy.has_param('{shown(right)}')`", f'`nh.hasParam("{shown(right)}")`')
-    return f", and ask {has}, too" if any("has_param" in e.detail for e in events) else ""
+    # roscpp asks by itself, in `nh.param(…)`
+    has = python_or_cpp(f", and ask `rospy.has_param('{shown(right)}')`, too", "")
+    return has if any("has_param" in e.detail for e in events) else ""
 
 
 def _named(node: str, wanted: str) -> str:

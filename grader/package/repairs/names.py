@@ -286,7 +286,7 @@ def repair_script_names(
         absent = [w for w in absent if role != "node" or w.strip("/") not in others]
         for name in dict.fromkeys(given):
             near = (w for w in absent if _is_slip(name, w, node) and _has_keys(w, name.keys, branches))
-            right = next(near, "")
+            right = next(near, "") or _elsewhere(name, given, absent, node)
             alike = {_resolve(one, node) for one in given if right and _is_slip(one, right, node)}
             if role in TOPIC_ROLES and len(alike) > 1:
                 continue  # any of them may be meant, or none
@@ -300,6 +300,22 @@ def repair_script_names(
                     continue
                 _replace_literal(files, file, name, literal, shown, plain=right in wanted.plain)
                 node = literal if role == "node" else node
+
+
+def _elsewhere(name: Name, given: Iterable[Name], absent: Iterable[str], node: str) -> str:
+    """Return the one topic or service that is asked for and that this one is in another namespace, or with its words in
+    another order; "" where another one of the script may be meant."""
+    if KINDS[name.role] not in {"topic-name", "service-name"} or not name.value.startswith("/"):
+        return ""  # a relative name may come to be any
+    own = {_resolve(one, node) for one in given}
+    found = [w for w in absent if _is_moved(_resolve(name, node), w)]
+    return found[0] if len(found) == 1 and sum(_is_moved(one, found[0]) for one in own) == 1 else ""
+
+
+def _is_moved(name: str, wanted: str) -> bool:
+    """Return whether the names end alike, or have the same words: `/robot/cmd_vel` for `/cmd_vel`, `/open_gate`."""
+    words, asked = (sorted(re.findall(r"[a-z0-9]+", one.lower())) for one in (name, wanted))
+    return words == asked or name.rpartition("/")[2] == wanted.rpartition("/")[2]
 
 
 def _is_same(one: Name, other: Name) -> bool:

@@ -19,6 +19,7 @@ from grader.wording import (
     IN_PLACE_OF_INPUT,
     IN_PLACE_OF_SPIN,
     NO_SEMICOLON,
+    PUBLISHED_TYPE,
     SWAPPED,
     TEXT_PLACE,
     WRITE_HANDLER,
@@ -71,6 +72,22 @@ def no_longer_hiding(file: str) -> Repair:
     return Repair(
         kind="file-name", file=file, before=file, after=new, message=message, fix=f"mv {file} {new}"
     )
+
+
+def instead(folder: Path, file: str, line: int, told: re.Match[str]) -> list[Repair]:
+    """Return the repair that leaves out a call of `ord` around what is a number already."""
+    files = Files(folder=folder.resolve())
+    lines = (files.text(file) or "").split("\n")
+    if line <= len(lines) and told[2] in lines[line - 1]:
+        lines[line - 1] = lines[line - 1].replace(told[2], told[1])
+        message = f"line {line} of {file}: in Python 3, {told[1]} is a number already"
+        files.change("missing-call", file, "\n".join(lines), message, told[0])
+    return list(files.repairs)
+
+
+def topic_type(folder: Path, file: str, line: int, told: re.Match[str]) -> list[Repair]:
+    """Return the repair of the type that a topic has, of any package's messages, or else of numbers."""
+    return message_type(folder, file, line, told[1], told[2]) or number_type(folder, file, line, told[2])
 
 
 def conversions(folder: Path, file: str, line: int, function: str, value: str) -> list[Repair]:
@@ -147,6 +164,30 @@ def message_type(folder: Path, file: str, line: int, package: str, name: str) ->
     return list(files.repairs)
 
 
+NUMBERS = re.compile(r"Float(?:32|64)|U?Int(?:8|16|32|64)")
+"""Messages of one number, whose `data` may be that of another one."""
+
+
+def number_type(folder: Path, file: str, line: int, name: str) -> list[Repair]:
+    """Return the repair that publishes numbers with another type of `std_msgs`, wherever a script names the one that
+    the publisher on this line has; none where it has that for another topic, too."""
+    files = Files(folder=folder.resolve())
+    text = files.text(file) or "" if file.endswith(".py") else ""
+    lines = text.split("\n")
+    given = re.search(r"Publisher\([^()]*?\b([A-Z]\w+)", lines[line - 1]) if line <= len(lines) else None
+    if given is None or not NUMBERS.fullmatch(given[1]) or not NUMBERS.fullmatch(name):
+        return []
+    if (
+        given[1][0] != name[0]
+        or len(re.findall(rf"(?:Publisher|Subscriber)\([^()]*?\b{given[1]}\b", text)) > 1
+    ):
+        return []
+    message = f"line {line} of {file}: the topic has the type std_msgs/{name}"
+    after = re.sub(rf"\b{given[1]}\b", name, text)
+    files.change("message-type", file, after, message, f"write {name} instead of {given[1]}")
+    return list(files.repairs)
+
+
 def swapped_arguments(folder: Path, file: str, line: int, function: str) -> list[Repair]:
     """Return the repair that swaps the two arguments of the line's only call of a function: `atan2(dx, dy)`."""
     files = Files(folder=folder.resolve())
@@ -179,6 +220,24 @@ def with_semicolon(folder: Path, file: str, line: int) -> list[Repair]:
     return list(files.repairs)
 
 
+def other_item(folder: Path, file: str, right: str, wrong: str) -> Repair | None:
+    """Return the repair that reads another part of a message, `axes[1]` for `axes[3]`; where a script reads both, each
+    in the other one's place."""
+    files = Files(folder=folder.resolve())
+    text = files.text(file) or ""
+    first = re.search(rf"\.{re.escape(wrong)}(?!\w)", text)
+    if first is None:
+        return None
+    both = re.search(rf"\.{re.escape(right)}(?!\w)", text) is not None
+    turned = {wrong: right, right: wrong}
+    either = re.compile(rf"(?<=\.)(?:{re.escape(wrong)}|{re.escape(right)})(?!\w)")
+    line = text.count("\n", 0, first.start()) + 1
+    message = f"line {line} of {file}: {wrong} is read where {right} is asked for"
+    fix = f"write `.{right}` in place of `.{wrong}`" + (", and the other way round" if both else "")
+    files.change("other-field", file, either.sub(lambda one: turned[one[0]], text), message, fix)
+    return next(iter(files.repairs), None)
+
+
 def other_field(folder: Path, file: str, field: str, other: str) -> Repair | None:
     """Return the repair that sets `field` of a message wherever a script sets `other`; None where it sets both, or the
     other one nowhere."""
@@ -198,7 +257,8 @@ def other_field(folder: Path, file: str, field: str, other: str) -> Repair | Non
 
 BY_HINT: tuple[tuple[re.Pattern[str], Callable[[Path, str, int, re.Match[str]], list[Repair]]], ...] = (
     (ASKED_RATE, lambda folder, _, __, told: loop_rate(folder, told[1], int(told[2]), told[3])),
-    (ASKED_TYPE, lambda folder, file, line, told: message_type(folder, file, line, told[1], told[2])),
+    (ASKED_TYPE, topic_type),
+    (PUBLISHED_TYPE, topic_type),
     (SWAPPED, lambda folder, file, _, told: swapped_arguments(folder, file, int(told[1]), told[2])),
     (
         NO_SEMICOLON,
@@ -218,6 +278,7 @@ BY_HINT: tuple[tuple[re.Pattern[str], Callable[[Path, str, int, re.Match[str]], 
             folder, file, int(told[1]), told[2], wrong=INPUT, why="waits for input"
         ),
     ),
+    (re.compile(r"^write `([^`]+)` instead of `(ord\([^`]+\))`"), instead),
     (re.compile(re.escape(TEXT_PLACE)), lambda folder, file, line, _: text_place(folder, file, line)),
     (CONVERTED, lambda folder, file, line, told: conversions(folder, file, line, told[1], told[2])),
 )
