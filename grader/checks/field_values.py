@@ -316,7 +316,8 @@ def _factor(found: Sequence[Reading], wanted: Sequence[float]) -> float:
         one.values[0] for one in found if len(one.values) == 1 and is_number(one.values[0]) and one.values[0]
     ]
     other = [one for one in wanted if one]
-    by = came[0] / other[0] if came and len(set(other)) > 1 else 0.0
+    changes = 1 + sum(before.values != one.values for before, one in pairwise(found))
+    by = came[0] / other[0] if came and len(set(other)) > 1 and changes == len(wanted) else 0.0
     return by if math.isfinite(by) and abs(by) != 1 else 0.0
 
 

@@ -6,8 +6,17 @@ from pathlib import Path
 
 import pytest
 
-from grader.package.repairs.of_runs import conversions, other_field, repairs_by_hint
-from grader.wording import ask_field, ask_rate, ask_semicolon, ask_type, fields_told, suspect_field
+from grader.package.repairs.of_runs import conversions, other_field, other_item, repairs_by_hint
+from grader.wording import (
+    ASKED_ITEM,
+    ask_field,
+    ask_item,
+    ask_rate,
+    ask_semicolon,
+    ask_type,
+    fields_told,
+    suspect_field,
+)
 
 
 @pytest.mark.parametrize(
@@ -112,3 +121,40 @@ def test_a_semicolon_of_a_cpp_file(line: int, below: str, right: str, tmp_path: 
     (tmp_path / "a.cpp").write_text("int main() {\n  f()  // first\n\n  g();\n  // the end\n}\n")
     found = repairs_by_hint(tmp_path, ask_semicolon(below), "a.cpp", line)
     assert [(one.kind, one.line, one.after) for one in found] == ([("build-line", 2, right)] if right else [])
+
+
+@pytest.mark.parametrize(
+    ("code", "right"),
+    [
+        ("x = joy.axes[3]\nz = joy.axes[1]\n", "x = joy.axes[1]\nz = joy.axes[3]"),
+        ("x = joy.axes[3]\n", "x = joy.axes[1]"),
+        ("x = joy.axes[2]\n", ""),
+    ],
+)
+def test_another_item_is_read(code: str, right: str, tmp_path: Path) -> None:
+    (tmp_path / "a.py").write_text(code)
+    told = ASKED_ITEM.search(ask_item("linear.x", "/joy", "axes[1]", "axes[3]"))
+    assert told is not None
+    found = other_item(tmp_path, "a.py", told[1], told[2])
+    assert [one.after for one in (found,) if one] == ([right] if right else [])
+
+
+@pytest.mark.parametrize(
+    ("code", "right"),
+    [
+        ("p = Publisher('/power', Float32)\np.publish(Float32(x))", "p = Publisher('/power', Float64)\np.publish(Float64(x))"),
+        ("p = Publisher('/power', Float32)\ns = Subscriber('/x', Float32, f)", ""),
+        ("p = Publisher('/power', String)", ""),
+    ],
+)  # fmt: skip
+def test_a_number_is_published_with_another_type(code: str, right: str, tmp_path: Path) -> None:
+    (tmp_path / "a.py").write_text(f"from std_msgs.msg import *\n{code}\n")
+    hint = "from std_msgs.msg import Float64, then rospy.Publisher('/power', Float64, queue_size=10)"
+    found = repairs_by_hint(tmp_path, hint, "a.py", 2)
+    assert [one.after for one in found] == ([right] if right else [])
+
+
+def test_a_byte_is_a_number_already(tmp_path: Path) -> None:
+    (tmp_path / "a.py").write_text("total = sum(ord(c) for c in image.data)\n")
+    found = repairs_by_hint(tmp_path, "write `c` instead of `ord(c)`", "a.py", 1)
+    assert [one.after for one in found] == ["total = sum(c for c in image.data)"]

@@ -425,6 +425,15 @@ CASES = {
         ["service-name"], "the service /estimat should be /estimate",
         asking(clients=("/estimate",)), {TALKER: "rospy.ServiceProxy('/estimate')"},
     ),
+    "topic-in-another-namespace": Case(
+        swapped(TALKER, ("'numeric_chatter'", "'/lab/numeric_chatter'")), ["topic-name"],
+        "the topic /lab/numeric_chatter should be /numeric_chatter",
+    ),
+    "service-with-its-words-in-another-order": Case(
+        swapped(TALKER, ("    rate = ", "    rospy.Service('/open_gate', Trigger, answer)\n    rate = ")),
+        ["service-name"], "the service /open_gate should be /gate/open",
+        asking(servers=("/gate/open", "/gate/close")),
+    ),
     "import-capitals": Case(swapped(TALKER, ("import Int8", "import int8")), ["missing-call"], "int8"),
     "class-in-other-letters": Case(swapped(TALKER, ("Int8", "int8")), ["missing-call"], "int8"),
     "class-of-another-name": Case(

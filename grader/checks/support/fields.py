@@ -364,16 +364,12 @@ def taken_from(
 def _is_usual(came: float, wanted: float, parts: tuple[float, float]) -> bool:
     """Return whether numbers are as they are by chance: alike, one a round part of the other, or small whole ones."""
     ratio = came / wanted
-    is_round = any(
-        abs(one - round(one)) < ITEM_ROUNDING for one in (ROUND_PARTS * ratio, ROUND_PARTS / ratio)
-    )
-    is_itself = parts == (came, wanted) and not all(
-        abs(one) < ROUND_PARTS and one == int(one) for one in parts
-    )
+    is_round = any(abs(one - round(one)) < ITEM_ROUNDING for one in (HALVES * ratio, HALVES / ratio))
+    is_itself = parts == (came, wanted) and not all(abs(one) < SMALL and one == int(one) for one in parts)
     return abs(parts[0]) == abs(parts[1]) or (is_round and not is_itself)
 
 
-ROUND_PARTS = 20
+HALVES, SMALL = 2, 20
 UNREAD = frozenset({"/clock", "/tf", "/tf_static"})
 ITEMS_MAX = 12
 ITEM_ROUNDING = 1e-5
