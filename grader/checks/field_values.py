@@ -338,7 +338,10 @@ def _in_order(
     verdict = text if found is not sent else passed(f"{what} is {params.words}")
     for number, value in enumerate(params.values):
         here = next((n for n in range(at, len(found)) if params.is_at(found[n], value)), None)
-        if here is None and (alike := _all_alike(found, params)):
+        item = (
+            taken_from(found[at], value, run.channels, params.topic) if here is None and found[at:] else None
+        )
+        if here is None and not item and (alike := _all_alike(found, params)):
             verdict = alike
             break
         if here is None and len(found) == len(params.values):  # none is missing: each has its place
@@ -358,7 +361,7 @@ def _in_order(
                 break
             make = f"set {params.field} to" if found[at:] else f"publish another message, with {params.field}"
             hint = f"{make} {value_text(value)}{before}; rostopic echo {params.topic} shows what your node publishes"
-            if item := taken_from(found[at], value, run.channels, params.topic) if found[at:] else None:
+            if item:
                 message, hint = _of_other_item(message, item, params)
             verdict = failed(message, hint=hint)
             later = any(params.is_at(one, v) for one in found[at:] for v in params.values[number + 1 :])

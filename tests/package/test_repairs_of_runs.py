@@ -142,7 +142,8 @@ def test_another_item_is_read(code: str, right: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("code", "right"),
     [
-        ("p = Publisher('/power', Float32)\np.publish(Float32(x))", "p = Publisher('/power', Float64)\np.publish(Float64(x))"),
+        ("p = Publisher('/power', Float32)\np.publish(Float32(x))",
+         "p = Publisher('/power', Float64)\np.publish(Float64(x))"),
         ("p = Publisher('/power', Float32)\ns = Subscriber('/x', Float32, f)", ""),
         ("p = Publisher('/power', String)", ""),
     ],

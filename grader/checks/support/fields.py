@@ -12,6 +12,7 @@ import re
 from bisect import bisect
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import partial
 from itertools import chain, permutations
 from typing import Annotated, Any, NamedTuple, Protocol, TypeGuard
 
@@ -365,7 +366,8 @@ def _is_usual(came: float, wanted: float, parts: tuple[float, float]) -> bool:
     """Return whether numbers are as they are by chance: alike, one a round part of the other, or small whole ones."""
     ratio = came / wanted
     is_round = any(abs(one - round(one)) < ITEM_ROUNDING for one in (HALVES * ratio, HALVES / ratio))
-    is_itself = parts == (came, wanted) and not all(abs(one) < SMALL and one == int(one) for one in parts)
+    are_same = all(map(partial(math.isclose, rel_tol=ITEM_ROUNDING), parts, (came, wanted)))
+    is_itself = are_same and not all(abs(one) < SMALL and one == int(one) for one in parts)
     return abs(parts[0]) == abs(parts[1]) or (is_round and not is_itself)
 
 

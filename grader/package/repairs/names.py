@@ -303,12 +303,12 @@ def repair_script_names(
 
 
 def _elsewhere(name: Name, given: Iterable[Name], absent: Iterable[str], node: str) -> str:
-    """Return the one topic or service that is asked for and that this one is in another namespace, or with its words in
-    another order; "" where another one of the script may be meant."""
+    """Return the one name that is asked for and is written in another place, or order; "" where any may be meant."""
     if KINDS[name.role] not in {"topic-name", "service-name"} or not name.value.startswith("/"):
-        return ""  # a relative name may come to be any
+        return ""
+    alike = [one for one in absent if _is_moved(_resolve(name, node), one)]
+    found = [one for one in alike if one.count("/") == min(each.count("/") for each in alike)]
     own = {_resolve(one, node) for one in given}
-    found = [w for w in absent if _is_moved(_resolve(name, node), w)]
     return found[0] if len(found) == 1 and sum(_is_moved(one, found[0]) for one in own) == 1 else ""
 
 
