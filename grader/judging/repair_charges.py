@@ -21,7 +21,7 @@ from grader.model.repair import Repair, advice_on, messages_of, place_of
 from grader.model.result import CriterionResult
 from grader.model.verdict import Citation, FileCitation, Status, Verdict, cited_lines, failed, share_text
 from grader.rubric.model import Criterion, Rubric
-from grader.wording import ASKED_TYPE, PUBLISHED_TYPE, join_words
+from grader.wording import ASKED_TYPE, join_words
 
 BUILD, INSTALL = "build", "cmake-install"
 OF_EXCEPTIONS = "callbacks-clean"
@@ -371,7 +371,7 @@ def is_told(repair: Repair, hint: str) -> bool:
     if repair.kind == "executable-bit":
         return repair.file in hint and "chmod" in hint
     if repair.kind == "message-type":
-        return ASKED_TYPE.search(hint) is not None or PUBLISHED_TYPE.search(hint) is not None
+        return ASKED_TYPE.search(hint) is not None
     if IN_PLACE_OF_ALL in hint and PurePosixPath(repair.file).name == CMAKE:
         return True
     if repair.kind == "parameter-name" and repair.before.strip() == repair.after.strip():

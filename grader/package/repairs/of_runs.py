@@ -24,6 +24,7 @@ from grader.wording import (
     TEXT_PLACE,
     WRITE_HANDLER,
     convert,
+    join_words,
 )
 
 
@@ -184,7 +185,9 @@ def number_type(folder: Path, file: str, line: int, name: str) -> list[Repair]:
         return []
     message = f"line {line} of {file}: the topic has the type std_msgs/{name}"
     after = re.sub(rf"\b{given[1]}\b", name, text)
-    files.change("message-type", file, after, message, f"write {name} instead of {given[1]}")
+    there = [str(n) for n, one in enumerate(lines, 1) if re.search(rf"\b{given[1]}\b", one)]
+    fix = f"write {name} instead of {given[1]}, on line {join_words(there)}"
+    files.change("message-type", file, after, message, fix)
     return list(files.repairs)
 
 
@@ -231,8 +234,10 @@ def other_item(folder: Path, file: str, right: str, wrong: str) -> Repair | None
     both = re.search(rf"\.{re.escape(right)}(?!\w)", text) is not None
     turned = {wrong: right, right: wrong}
     either = re.compile(rf"(?<=\.)(?:{re.escape(wrong)}|{re.escape(right)})(?!\w)")
-    line = text.count("\n", 0, first.start()) + 1
-    message = f"line {line} of {file}: {wrong} is read where {right} is asked for"
+    line = text.count("\n", 0, (either.search(text) or first).start()) + 1
+    told = f"{wrong} is read where {right} is asked for"
+    told = f"{wrong} and {right} are read in each other's place" if both else told
+    message = f"line {line} of {file}: {told}"
     fix = f"write `.{right}` in place of `.{wrong}`" + (", and the other way round" if both else "")
     files.change("other-field", file, either.sub(lambda one: turned[one[0]], text), message, fix)
     return next(iter(files.repairs), None)
