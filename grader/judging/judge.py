@@ -374,12 +374,8 @@ def verdict_of(criterion: Criterion, facts: Facts, checks: Mapping[str, Check] =
                 run = asked.get("run")
                 found = explain_loss(check, facts.package_of(criterion), run, found)
                 found = _of_the_build(criterion, facts, run, found)
-        if found.status is Status.PASS and not found.hint:  # what follows completes hints
-            return _with_package_name(found, criterion, facts)
-        found = fill_slots(choose_hint_language(found, criterion, facts), criterion, facts.rubric)
-        found = name_other_imports(name_other_lines(found, facts), criterion, facts)
-        found = allow_typing(name_other_parameters(found, criterion, facts), criterion, facts)
-        found = keep_other_names(name_connections(found, facts), criterion, facts.rubric)
+        if found.status is not Status.PASS or found.hint:
+            found = _with_better_hint(found, criterion, facts)
         found = _with_package_name(found, criterion, facts)
         found = name_same_file(name_rospy(found, criterion, facts), criterion, facts)
         return _without_git(found, facts.package)
@@ -389,6 +385,14 @@ def verdict_of(criterion: Criterion, facts: Facts, checks: Mapping[str, Check] =
         return inconclusive(error.message, hint=error.hint)
     except Exception as error:  # noqa: BLE001 - whatever goes wrong in a check must not cost a student a mark
         return _verdict_of_crash(check, error)
+
+
+def _with_better_hint(verdict: Verdict, criterion: Criterion, facts: Facts) -> Verdict:
+    """Return the verdict with a hint that says what the check does not know: the rubric, and what other runs show."""
+    found = fill_slots(choose_hint_language(verdict, criterion, facts), criterion, facts.rubric)
+    found = name_other_imports(name_other_lines(found, facts), criterion, facts)
+    found = allow_typing(name_other_parameters(found, criterion, facts), criterion, facts)
+    return keep_other_names(name_connections(found, facts), criterion, facts.rubric)
 
 
 def _without_git(verdict: Verdict, package: PackageFacts | None) -> Verdict:

@@ -97,6 +97,7 @@ _ILLEGAL_NAME = re.compile(
     r"register (publication|subscription|service)(?: topic)? \[([^\[\]]*)\] with master: "
 )
 _NUMBER_ASKED = re.compile(r"\b(?:int|float)\(\s*(?:raw_)?input\(")
+_NEEDS_INIT = re.compile(r"^(?!.*already been called).*init_node")
 _ARITY = re.compile(r"([\w.<>]+)\(\) (?:takes|missing) ")
 _NAME = re.compile(r"(?:name|local variable) '(\w+)' (?:is not defined|where it is not|referenced before)")
 _BY_PYTHON = re.compile(r"\. Did you mean: '(\w+)'\?$")
@@ -431,8 +432,7 @@ def _by_other_lines(found: Traceback, place: FileCitation, package: PackageFacts
         return no_number(found, place, package)
     if slip := next((name for said, name in OF_OTHER_LINES.items() if said in found.message), ""):
         return next(((s.message, s.fix) for s in own if slip in {s.kind, s.name}), None)
-    told = found.message.rpartition("already been called")[2]  # a second call comes too late, not too early
-    late = found.kind in {"ROSInitException", "ROSException"} and "init_node" in told
+    late = found.kind in {"ROSInitException", "ROSException"} and _NEEDS_INIT.search(found.message)
     calls = [f.line for f in found.own_frames if path_in_package(package, f.file) == place.file] or [1]
     return _late_init(place.file, calls, package) if late else explain_narrow_handler(found, place, package)
 

@@ -20,6 +20,7 @@ from script_tree import (
     names_in,
     slip,
 )
+from script_unsent import replaced_names
 
 PAUSES = ("rospy.sleep", "time.sleep")
 
@@ -135,3 +136,42 @@ def sleeps_twice(tree):
             lines = sorted(body[i].lineno for i in at)
             message = "the loop sleeps on line %d and again on %s" % (lines[0], listed(lines[1:]))
             yield slip(surplus[-1], "sleep-twice", message, "delete %s" % listed(surplus))
+
+
+def publishes_twice(tree):
+    """Loops that publish on one topic more than once in each of their turns, and sleep once at most."""
+    several = {name for name, *_ in replaced_names(tree)}  # each was to be another topic's
+    for loop in all_of(tree, *LOOPS):
+        by_publisher = {}
+        for one in loop.body:
+            sent = isinstance(one, ast.Expr) and called_name(one.value) == "publish"
+            if sent and dotted(one.value.func).rpartition(".")[0] not in several:
+                by_publisher.setdefault(ast.dump(one.value.func), []).append(one)
+        many = next((same for same in by_publisher.values() if len(same) > 1), None)
+        if many is None:
+            yield from published_in_if_too(loop, by_publisher)
+            continue
+        first, last = (loop.body.index(one) for one in (many[0], many[-1]))
+        if any(calls_in(n, *WAITS) for n in loop.body[first:last]):
+            continue
+        lines = [one.lineno for one in many]
+        if ast.dump(many[0]) == ast.dump(many[1]) and loop.body[first + 1] is many[1]:
+            message = "the loop publishes on line %d and the same again on line %d" % (lines[0], lines[1])
+            fix = "delete line %d" % lines[1]
+        else:
+            message = "each pass through the loop publishes on " + listed(lines)
+            fix = "delete all but one of " + listed(lines)
+        yield slip(lines[1], "publish-twice", message, fix)
+
+
+def published_in_if_too(loop, by_publisher):
+    """Yield the one line in an `if` of a loop that publishes what the loop publishes in each turn anyway."""
+    choices = [one for one in loop.body if isinstance(one, ast.If) and not calls_in(one, *WAITS)]
+    again = [
+        (one, n) for one in choices for n in calls_in(one, "publish") if ast.dump(n.func) in by_publisher
+    ]
+    leaves = any(isinstance(n, (ast.Continue, ast.Break, ast.Return)) for n in ast.walk(loop))
+    if len(again) == 1 and not leaves:
+        one, call = again[0]
+        message = "line %d publishes once more, in the `if` on line %d" % (call.lineno, one.lineno)
+        yield slip(call.lineno, "publish-twice", message, "delete line %d" % call.lineno)

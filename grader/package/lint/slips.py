@@ -72,7 +72,7 @@ def slips(tree, numbers=()):
         rates.timers_once, rates.rates_made_once, counters.resets, never_run, names.of_the_function_around,
         loops.never_reached, loops.loops_that_never_go_round, loops.waits_without_not,
         loops.stopped_loops, loops.lacking_loops, loops.published_before,
-        sleeps.sleepless_loops, sleeps.sleeps_twice, loops.publishes_twice, callbacks.callbacks,
+        sleeps.sleepless_loops, sleeps.sleeps_twice, sleeps.publishes_twice, callbacks.callbacks,
         callbacks.waiting_callbacks, objects.queue_sizes, graph_names,
         objects.object_slips, said_texts, loops.deaf_loops, clocks.clock_values, counters.counter_slips,
         counters.counter_types, counters.counter_starts, without_effect, values.assigned_late, objects.hidden_names,

@@ -55,7 +55,8 @@ FUTURE = re.compile(r"\s*from\s+__future__\s+import\s+[\w \t,]+(#.*)?")
 KNOWN_WORDS = {
     *keyword.kwlist, *dir(builtins), *"bfru", "rospy", "data", "msg", "srv", "std_msgs", "String", "init_node",
     "anonymous", "Publisher", "publish", "queue_size", "Subscriber", "spin", "Rate", "sleep", "is_shutdown", "get_time",
-    "loginfo", "get_caller_id", "get_name", "get_param", "Service", "ServiceProxy", "Timer", "Duration", "ROSInterruptException",
+    "loginfo", "get_caller_id", "get_name", "get_param", "Service", "ServiceProxy", "Timer",
+    "Duration", "ROSInterruptException",
 }  # fmt: skip
 """Python's, and what most nodes use."""
 Step = dict[str, Any]
