@@ -194,8 +194,7 @@ def _find_cause(life: Life, run: Run, package: PackageFacts) -> Ending:
     last = next(iter(exceptions or printed[::-1]), "")
     words = f"; its last output: {shown(last)}" if last else ""
     # Remappings are ROS's, and no arguments of the program.
-    given = [one for one in life.start.argv[1:] if ":=" not in one]
-    explained = explain_arguments(last, given)
+    explained = explain_arguments(last, [one for one in life.start.argv[1:] if ":=" not in one])
     words, hint = (f"{words}; {explained[0]}", explained[1]) if explained else (words, RUN_IT)
     own = [s for s in package.slips if (s.file, s.kind) == (life.start.script, "ends-node")]
     words, hint, cited = (f": {own[0].message}", own[0].fix, (own[0].place,)) if own else (words, hint, ())

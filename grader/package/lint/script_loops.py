@@ -202,12 +202,13 @@ def lacking_loops(tree):
     latched = any(one.arg == "latch" for one in all_of(tree, ast.keyword))
     if any(all_of(tree, *LOOPS)) or calls_in(tree, *waits) or latched:
         return
+    has_rate, spins = bool(calls_in(tree, "Rate")), bool(calls_in(tree, "spin"))
     for body in [getattr(node, "body", None) for node in ast.walk(tree)]:
         alone = [one for one in body if isinstance(one, ast.Expr)] if isinstance(body, list) else []
         sent, slept, spun = (
             [one.lineno for one in alone if is_call(one.value, name)] for name in ("publish", "sleep", "spin")
         )
-        last = (spun or (slept if calls_in(tree, "Rate") and not calls_in(tree, "spin") else [0]))[-1:]
+        last = (spun or (slept if has_rate and not spins else [0]))[-1:]
         if not sent or [sent[0]] >= last:
             continue
         message = "no loop is around line %d, so it publishes once" % sent[0]
@@ -217,11 +218,7 @@ def lacking_loops(tree):
                 sent[-1],
                 len(sent),
             )
-        wait = (
-            "the rate's sleep()"
-            if calls_in(tree, "Rate")
-            else "the sleep() of a `rospy.Rate(...)` made above it"
-        )
+        wait = "the rate's sleep()" if has_rate else "the sleep() of a `rospy.Rate(...)` made above it"
         fix = "publish in a loop `while not rospy.is_shutdown():` that ends with " + wait
         if spun:
             fix += ", in place of spin() on line %d" % spun[-1]

@@ -1,4 +1,5 @@
-"""Finds loops in a student's Python that publish and sleep nowhere, or twice in each of their turns, for `slips.py`.
+"""Finds loops in a student's Python that publish and sleep nowhere, or do either twice in each of their turns, for
+`slips.py`.
 
 Nothing is executed. Python 3.8, standard library only.
 """
