@@ -7,6 +7,7 @@ Pure, and the standard library only: `python_repairs/examine.py` calls it in a c
 from __future__ import annotations
 
 import ast
+import builtins
 import html
 import keyword
 import os
@@ -83,9 +84,13 @@ def reason_of_line(line: str, message: str = "") -> Reason:
         return Reason(f"Python writes `{meant[1]}`, not `{meant[0]}`")
     if (twice := reason_of_doubled(line)).why:
         return twice
-    for word, right, changed in _with_keyword(code):
-        if _parses(_together(changed, "", texts)):
-            return Reason(f"Python writes `{right}`, not `{word}`")
+    keywords = ((word, right, _together(changed, "", texts)) for word, right, changed in _with_keyword(code))
+    why = next(
+        (f"Python writes `{right}`, not `{word}`" for word, right, one in keywords if _parses(one)), ""
+    )
+    turned = "" if why else _turned_signs(line, corrected(line, message))
+    if why or turned:
+        return Reason(why or f"{turned} are the wrong way round")
     if apart := next(_with_separator(code, texts), ""):
         sign = "%" if apart.count("%") > code.count("%") else ","
         return Reason(f"`{sign}` is missing between two values")
@@ -124,7 +129,10 @@ def corrected(line: str, message: str = "", column: int | None = None) -> str:
     `message` is what Python says of the line, and `column` the place, from 1.
     """
     shorter = _without_unmatched(line, message, column) if _ends_earlier_lines(line) else ""
-    return next((one for one in corrections(line, message, column) if one != line and _parses(one)), shorter)
+    own = list(corrections(line, message, column))
+    likely = [] if _parses(line) else with_known_words(line, own, KNOWN_WORDS)
+    turned = [one for one in likely if _turned_signs(line, one)]
+    return next((one for one in (*turned, *own) if one != line and _parses(one)), shorter)
 
 
 def corrections(line: str, message: str = "", column: int | None = None) -> Iterator[str]:
@@ -166,7 +174,8 @@ def with_known_words(line: str, own: Sequence[str], known: Collection[str]) -> l
     """Return the line's corrections. Where the first of its `own` that is good Python has a word that is not `known`,
     the line with two neighbours exchanged comes before them, or with a sign more or less by which a word becomes a
     known one."""
-    least = next((len(unknown_words(one, known)) for one in own if _parses(one)), len(line))
+    good = next((one for one in own if _parses(one)), "")
+    least = len(unknown_words(good, known)) if good else len(line)
     if len(line) > EDITED_CHARS_MAX:
         return [*own]
     said, strange, texts = set(_words(line)), unknown_words(line, known), _taken_apart(line)[2]
@@ -176,7 +185,7 @@ def with_known_words(line: str, own: Sequence[str], known: Collection[str]) -> l
         is_plain = _taken_apart(one)[2] == texts
         # a sign or a letter that slipped behind a quote: `'talker)'`, `d'ata'`
         is_moved = len(_OUTSIDE.findall(without_texts(one))) > len(_OUTSIDE.findall(without_texts(line)))
-        is_better = left < len(strange) or is_moved or (is_plain and set(_words(one)) == said)
+        is_better = left < len(strange) or is_moved or (is_plain and not good and set(_words(one)) == said)
         if is_better and left <= least and (least or is_moved) and _parses(one):
             near[one] = left
     for one in _one_sign_off(line) if least else ():
@@ -198,10 +207,21 @@ def _words(line: str) -> list[str]:
 
 
 def _turned(line: str) -> Iterator[str]:
-    """Yield the line with two neighbours exchanged, of which one at least is no letter."""
+    """Yield the line with two neighbours exchanged, of which one at least is no letter. No two words become one, and
+    only a quote is exchanged with a colon."""
     for at in range(len(line) - len(line.lstrip()), len(line) - 1):
-        if not line[at : at + 2].isalnum():
-            yield line[:at] + line[at + 1] + line[at] + line[at + 2 :]
+        pair = line[at : at + 2]
+        one = line[:at] + pair[::-1] + line[at + 2 :]
+        joins = " " in pair and len(_words(one)) < len(_words(line))
+        if not pair.isalnum() and not joins and (":" not in pair or not {*"'\""}.isdisjoint(pair)):
+            yield one
+
+
+def _turned_signs(line: str, right: str) -> str:
+    """Return the two neighbours that are exchanged in the right line; "" where that differs in another way."""
+    at = next((n for n, (one, other) in enumerate(zip(line, right, strict=False)) if one != other), len(line))
+    is_turned = line[at : at + 2] == right[at : at + 2][::-1] and line[at + 2 :] == right[at + 2 :]
+    return f"`{line[at]}` and `{line[at + 1]}`" if at < len(line) - 1 and is_turned else ""
 
 
 def _one_sign_off(line: str) -> Iterator[str]:
@@ -211,6 +231,13 @@ def _one_sign_off(line: str) -> Iterator[str]:
     yield from (line[:at] + sign + line[at:] for sign in _SIGNS for at in range(begin + 1, len(line) + 1))
 
 
+KNOWN_WORDS = {
+    *keyword.kwlist, *dir(builtins), *"bfru", "rospy", "data", "msg", "srv", "std_msgs", "String", "init_node",
+    "anonymous", "Publisher", "publish", "queue_size", "Subscriber", "spin", "Rate", "sleep", "is_shutdown", "get_time",
+    "loginfo", "get_caller_id", "get_name", "get_param", "Service", "ServiceProxy", "Timer", "Duration",
+    "ROSInterruptException",
+}  # fmt: skip
+"""Python's, and what most nodes use."""
 _SIGNS = " ()[].,:="
 _OUTSIDE = re.compile(r"[(),:]")
 _LEFT_OUT = " ()[],:="

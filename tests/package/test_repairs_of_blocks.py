@@ -249,6 +249,7 @@ if __name__ == '__main__':
     [
         ("def on_number(", "    def on_number("),
         ("def talk(", "    def talk("),
+        ("def heard(", "    def heard("),
         ("    if number.data", "    # if number.data"),
         ("def heard(text):\n", ""),
         ("    while not rospy.is_shutdown():\n", ""),

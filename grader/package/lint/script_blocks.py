@@ -10,6 +10,7 @@ from itertools import takewhile
 
 LEAVES = re.compile(r"\s*(return|break|continue|raise)\b")
 GIVES = re.compile(r"\s*([\w.]+)\s*[-+*/]?=(?!=)(.*)")
+HEAD = re.compile(r"\s*(def|class)\b|\s*@")
 BRANCHES = re.compile(r"\s*(elif|else)\b")
 DEPTHS = (2, 3, 4, 8)
 """So much further in a block may begin."""
@@ -64,7 +65,7 @@ def lacks_def(lines, at):
     """Return whether the first line of a function is missing above the line at index `at`, which is further in than the
     code above it: it stands apart from that by two blank lines, or by one and is about `self`."""
     code = [n for n, line in enumerate(lines) if is_code(line)]
-    if at not in code[1:]:
+    if at not in code[1:] or HEAD.match(lines[at]):
         return False
     first = code.index(at)
     above, own = code[first - 1], width_of(lines[at])

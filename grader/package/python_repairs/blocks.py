@@ -80,6 +80,8 @@ def in_their_blocks(lines: list[str], at: int, message: str) -> Iterator[tuple[s
         yield "twice", "\n".join([*lines[:at], *lines[at + 1 :]])
     if "expected an indented block" in message:
         yield from (("level", candidate) for candidate in _with_head_further_out(lines, at))
+    if message == "unexpected indent" and DEFINES.match(lines[at].strip()):
+        yield from (("level", candidate) for candidate in _with_def_further_out(lines, at))
     if message.startswith(("expected an indented block", "unindent does not match")):
         yield from (("turned", candidate) for candidate in _with_loop_below(lines, at))
         yield from (("indent", candidate) for candidate in _with_body_indented(lines, at))
@@ -107,6 +109,14 @@ def _with_head_further_out(lines: list[str], at: int) -> Iterator[str]:
         yield with_line(lines, head, lines[head].lstrip())
     elif DEFINES.match(lines[head].strip()) and re.match(r"\s*def\s", around) and _width(lines[at]) == own:
         yield with_line(lines, head, _indentation(around) + lines[head].lstrip())
+
+
+def _with_def_further_out(lines: list[str], at: int) -> Iterator[str]:
+    """Yield the text with the first line of a function where the code above it begins, if its body is there already."""
+    above = next((line for line in reversed(lines[:at]) if without_texts(line).strip()), "")
+    below = next((line for line in lines[at + 1 :] if without_texts(line).strip()), "")
+    if _width(above) < _width(lines[at]) == _width(below):
+        yield with_line(lines, at, _indentation(above) + lines[at].lstrip())
 
 
 def with_body_uncommented(lines: list[str], message: str) -> Iterator[tuple[str, str]]:

@@ -8,14 +8,13 @@ and nothing is executed.
 from __future__ import annotations
 
 import ast
-import builtins
-import keyword
 import re
 from collections.abc import Iterable, Iterator
 from functools import lru_cache
 from typing import Any
 
 from grader.line_slips.python import (
+    KNOWN_WORDS,
     PLAIN,
     corrections,
     reason_of_line,
@@ -52,13 +51,6 @@ OF_WHOLE = re.compile(
 OF_BLOCK = re.compile(r"(elif|else|except|finally|try)\b")
 ROSPY_COMMA = re.compile(r"(?<![\w.])rospy\s*[,;:]\s*(?=[A-Za-z]\w*\s*[(:])")
 FUTURE = re.compile(r"\s*from\s+__future__\s+import\s+[\w \t,]+(#.*)?")
-KNOWN_WORDS = {
-    *keyword.kwlist, *dir(builtins), *"bfru", "rospy", "data", "msg", "srv", "std_msgs", "String", "init_node",
-    "anonymous", "Publisher", "publish", "queue_size", "Subscriber", "spin", "Rate", "sleep", "is_shutdown", "get_time",
-    "loginfo", "get_caller_id", "get_name", "get_param", "Service", "ServiceProxy", "Timer",
-    "Duration", "ROSInterruptException",
-}  # fmt: skip
-"""Python's, and what most nodes use."""
 Step = dict[str, Any]
 """`cause`, `line`, the `text` that comes out, and for what does not parse the `error`."""
 
