@@ -107,12 +107,13 @@ def _of_errors(
     of_others = {c.scenario for c in rubric.criteria if c.id in lost and c.parameters.get("of", OWN) != OWN}
     known = {(one.file, one.line) for one in found}
     for criterion in (one for one in criteria if one.status.is_lost and not one.blocked_by):
-        if criterion.check == "topic-type" and criterion.scenario not in of_others:
-            continue
         cited = next((one for one in criterion.citations if isinstance(one, FileCitation)), None)
         if cited is None or cited.line is None or cited.file.startswith("../"):
             continue
         for repair in repairs_by_hint(submission.package.folder, criterion.hint, cited.file, cited.line):
+            own_type = criterion.check == "topic-type" and repair.kind == "message-type"
+            if own_type and criterion.scenario not in of_others:
+                continue
             if (repair.file, repair.line) not in known:
                 known.add((repair.file, repair.line))
                 yield repair
