@@ -23,6 +23,7 @@ from grader.report.html.page import BYTES_MAX, render_html
 from grader.report.html.shell import policy, script
 from grader.report.sentences import FAULTS, MINUS
 from grader.report.text import code_parts, line, visible
+from grader.report.view import commands_in
 from tests.report.anything import FIELDS, HUGE, SOME, decided, of, results, spoiled
 from tests.report.hostile import CRITERIA, result, rubric
 from tests.report.html.made import SCRIPT, code, console, figures, graph, hostile_figures
@@ -383,9 +384,12 @@ def test_any_text_of_a_criterion_stands_in_its_card(shown):
     for field in FIELDS:
         if field not in {"check", "scenario", "hint"}:
             text = line(getattr(shown.criteria[0], field), 1000)
-            # an identifier stands as it is, with its backticks
-            said = text if field == "id" else "".join(part for part, _ in code_parts(text))
-            assert " ".join(said.split()) in content, "without the backticks around code"
+            # an identifier stands as it is, with its backticks, and commands apart from the words between them
+            said = [text] if field == "id" else ["".join(part for part, _ in code_parts(text))]
+            said = [part for part, _ in commands_in(text)] if field == "reproduce" else said
+            assert all(" ".join(part.split()) in content for part in said), (
+                "without the backticks around code"
+            )
 
 
 @pytest.mark.parametrize(
