@@ -75,7 +75,7 @@ def no_longer_hiding(file: str) -> Repair:
     )
 
 
-def instead(folder: Path, file: str, line: int, told: re.Match[str]) -> list[Repair]:
+def without_ord(folder: Path, file: str, line: int, told: re.Match[str]) -> list[Repair]:
     """Return the repair that leaves out a call of `ord` around what is a number already."""
     files = Files(folder=folder.resolve())
     lines = (files.text(file) or "").split("\n")
@@ -283,7 +283,7 @@ BY_HINT: tuple[tuple[re.Pattern[str], Callable[[Path, str, int, re.Match[str]], 
             folder, file, int(told[1]), told[2], wrong=INPUT, why="waits for input"
         ),
     ),
-    (re.compile(r"^write `([^`]+)` instead of `(ord\([^`]+\))`"), instead),
+    (re.compile(r"^write `([^`]+)` instead of `(ord\([^`]+\))`"), without_ord),
     (re.compile(re.escape(TEXT_PLACE)), lambda folder, file, line, _: text_place(folder, file, line)),
     (CONVERTED, lambda folder, file, line, told: conversions(folder, file, line, told[1], told[2])),
 )
